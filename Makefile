@@ -1,5 +1,5 @@
 # Every command of the project; `make help` lists them.
-# Needed beforehand: Rust 1.90+, Python 3.10+ with venv, make and a C linker. The rest is installed by .ci/setup.
+# Needed beforehand: Rust 1.90+, Python 3.10+ with venv, make and a C linker. .ci/setup and .ci/device do the rest.
 
 PY := .venv/bin/python
 CARGO_TEST := cargo test --release --locked --workspace --exclude python
@@ -8,22 +8,28 @@ ifdef CI
 export BUMPWGPU_REQUIRE_GPU := 1
 endif
 
-.PHONY: help setup extension demo test test-rust test-python test-slow wheel bench lint clean
+.PHONY: help setup device extension demo test test-rust test-python test-slow wheel bench lint clean
 .DEFAULT_GOAL := help
 
 help: ## list the commands
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{ printf "%-20s %s\n", $$1, $$2 }'
 
-setup: ## check what is needed, install a Vulkan device when there is none, make .venv
+setup: ## check what is needed beforehand and prepare .venv
 	@.ci/setup
+
+device: ## install a software Vulkan device when none answers
+	@.ci/device
 
 extension: setup ## compile the package into .venv (release build)
 	@.venv/bin/maturin develop --release --quiet --extras plot,compare
 
-demo: extension ## bake, render and compare real input; writes demo_output/
+demo: setup device extension ## bake, render and compare real input; writes demo_output/
 	@$(PY) examples/demo.py --output demo_output
 
-test: test-rust test-python ## every test but the slow ones, Rust and Python
+# Without a device the tests that need one are skipped, which .ci/device has then given the reason for.
+test: setup ## every test but the slow ones, Rust and Python; with its own set-up
+	@.ci/device || [ -z "$$CI" ]
+	@$(MAKE) --no-print-directory test-rust test-python
 
 test-rust: setup ## the Rust tests
 	$(CARGO_TEST)
