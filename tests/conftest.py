@@ -1,0 +1,56 @@
+"""What all tests share: the folders, the device gate and the optional real assets."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="session")
+def root() -> Path:
+    """The checkout."""
+    return ROOT
+
+
+@pytest.fixture(scope="session")
+def assets() -> Path:
+    """The folder of real assets, which are not part of the project: `BUMPWGPU_TEST_DATA` or ../shared/data."""
+    folder = Path(os.environ.get("BUMPWGPU_TEST_DATA", ROOT.parent / "shared" / "data"))
+    if not folder.is_dir():
+        pytest.skip(f"no real assets in {folder}")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def _device_problem() -> str | None:
+    import bumpwgpu as bw
+
+    mesh = bw.Mesh.quad()
+    material = bw.Material(height=bw.HeightMap([[0.5]]))
+    camera = bw.Camera.look_at((0, 0, 3), (0, 0, 0))
+    try:
+        bw.render(mesh, material, camera=camera, lights=[], technique="flat", size=(8, 8), shadows=False)
+    except bw.RenderError as error:
+        return str(error)
+    return None
+
+
+@pytest.fixture
+def gpu(_device_problem: str | None) -> None:
+    """Skips when no Vulkan device answers; fails instead when BUMPWGPU_REQUIRE_GPU=1."""
+    if _device_problem is None:
+        return
+    if os.environ.get("BUMPWGPU_REQUIRE_GPU") == "1":
+        pytest.fail(f"a Vulkan device is required: {_device_problem}")
+    pytest.skip(f"no Vulkan device: {_device_problem}")
+
+
+@pytest.fixture(autouse=True)
+def _gate(request: pytest.FixtureRequest) -> None:
+    """Lets `@pytest.mark.gpu` stand for the `gpu` fixture."""
+    if request.node.get_closest_marker("gpu"):
+        request.getfixturevalue("gpu")
