@@ -1,0 +1,23 @@
+//! Height fields and the searches that find where a ray meets them.
+//!
+//! Everything here is plain Rust on the CPU: no device, no files, no Python. Positions are in
+//! *texture space* `(u, v, z)`: `u` to the right, `v` down (row 0 of an image is `v = 0`), `z` the
+//! normalised height, 0 low and 1 high. Texel `i` of `W` has its centre at `u = (i + 0.5) / W`.
+//!
+//! Data flows one way: [`HeightField`] -> [`MaxPyramid`] -> [`search`] -> [`march()`].
+
+pub mod error;
+pub mod field;
+pub mod march;
+pub mod oracle;
+pub mod pyramid;
+pub mod ray;
+pub mod search;
+pub mod technique;
+
+pub use error::HeightFieldError;
+pub use field::{Extent, HeightField, Wrap};
+pub use march::{Hits, MarchOptions, OutputSet, RayArray, march};
+pub use pyramid::MaxPyramid;
+pub use ray::{Found, Segment, Status};
+pub use technique::{Parameter, Technique, TechniqueInfo};

@@ -1,0 +1,97 @@
+//! The searches: where does a ray meet the height field? One file each, and one of the same name
+//! in `shaders_wgsl/search/` with the same function names and argument order.
+
+use glam::Vec3;
+
+use crate::march::{Chunk, march_by_segments};
+use crate::technique::TechniqueInfo;
+use crate::{Found, HeightField};
+
+/// What each technique's file provides; the twin of the two functions in its WGSL file.
+pub trait Search: Sized {
+    /// Searches the segment from `start` to `start + delta` (texture space).
+    ///
+    /// `cos_theta` is the cosine between ray and normal in mesh units.
+    fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, cos_theta: f32) -> Found;
+
+    /// Whether a segment that starts on the surface and goes up is blocked.
+    fn occluded(&self, field: &HeightField, start: Vec3, delta: Vec3, cos_theta: f32) -> bool;
+
+    /// Runs the search over many rays.
+    #[inline]
+    fn march(&self, field: &HeightField, chunk: &mut Chunk<'_>) {
+        march_by_segments(self, field, chunk);
+    }
+}
+
+/// Declares a technique: its parameter struct and its [`TechniqueInfo`].
+macro_rules! technique {
+    (
+        $(#[$doc:meta])*
+        $type:ident = $name:literal, reads $reads:ident, casts_shadows $shadows:literal,
+        summary $summary:literal,
+        source $source:literal,
+        parameters { $($(#[$pdoc:meta])* $parameter:ident: $default:literal in $min:literal..=$max:literal, $psummary:literal;)* }
+    ) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub struct $type { $(#[doc = $psummary] pub $parameter: u32,)* }
+
+        /// The registry entry of this technique.
+        pub static INFO: $crate::TechniqueInfo = $crate::TechniqueInfo {
+            name: $name,
+            summary: $summary,
+            source: $source,
+            parameters: &[$($crate::Parameter {
+                name: stringify!($parameter),
+                summary: $psummary,
+                default: $default as f64,
+                min: $min as f64,
+                max: $max as f64,
+            },)*],
+            reads: $crate::technique::Reads::$reads,
+            casts_shadows: $shadows,
+            search: |field, start, delta, cos_theta, values| {
+                $type::read(values).search(field, start, delta, cos_theta)
+            },
+            occluded: |field, start, delta, cos_theta, values| {
+                $type::read(values).occluded(field, start, delta, cos_theta)
+            },
+            march: |field, values, chunk| $type::read(values).march(field, chunk),
+        };
+
+        impl $type {
+            #[inline]
+            fn read(values: &$crate::technique::Values) -> Self {
+                let [$($parameter,)* ..] = *values;
+                Self { $($parameter: $parameter as u32,)* }
+            }
+        }
+    };
+}
+
+pub mod binary;
+pub mod exact;
+pub mod interval;
+pub mod layers;
+pub mod parallax;
+pub mod parallax_limited;
+pub mod pom;
+pub mod relief;
+pub mod steep;
+pub mod steep_exponential;
+pub mod steep_linear;
+
+/// All techniques that search, in the order users see them.
+pub static REGISTRY: &[&TechniqueInfo] = &[
+    &parallax::INFO,
+    &parallax_limited::INFO,
+    &steep::INFO,
+    &steep_linear::INFO,
+    &steep_exponential::INFO,
+    &binary::INFO,
+    &relief::INFO,
+    &pom::INFO,
+    &interval::INFO,
+    &exact::INFO,
+];

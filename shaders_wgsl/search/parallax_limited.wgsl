@@ -1,0 +1,20 @@
+// Parallax mapping with offset limiting: the offset is not divided by the cosine of the view angle.
+// Welsh 2004.
+//
+// start, delta: texture-space segment (u, v, z); cos_theta: cosine between ray and normal.
+// Twin of crates/heightfield/src/search/parallax_limited.rs.
+#import "lib/found.wgsl"
+#import "lib/height.wgsl"
+
+fn search(start: vec3f, delta: vec3f, cos_theta: f32) -> Found {
+    if delta.z >= 0.0 {
+        return found_left(0u);
+    }
+    let surface = start + delta * ((height_info.base - start.z) / delta.z);
+    let height = height_at(surface.xy);
+    return found_hit(max(((height_info.base + (height - height_info.base) * cos_theta) - start.z) / delta.z, 0.0), 1u);
+}
+
+fn occluded(start: vec3f, delta: vec3f, cos_theta: f32) -> bool {
+    return false;
+}
