@@ -1,0 +1,10 @@
+// Group 3: one mesh in the scene. Object space here has its origin at the middle of the mesh, so that
+// far-off coordinates lose no digits. Host: `crates/render/src/uniforms.rs`.
+
+struct DrawInfo {
+    relative_from_object: mat4x4f,   // to camera-relative world space
+    object_from_relative: mat4x4f,   // its inverse; transposed, it takes normals to world space
+    eye: vec4f,                      // camera, object space
+}
+
+@group(3) @binding(0) var<uniform> draw: DrawInfo;

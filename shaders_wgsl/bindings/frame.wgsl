@@ -1,0 +1,20 @@
+// Group 0: what all draws of a frame share. Positions are relative to the camera, axes those of the
+// world. Host: `crates/render/src/uniforms.rs`.
+
+struct FrameInfo {
+    clip_from_relative: mat4x4f,
+    forward: vec4f,        // unit view axis; w: near plane, world units
+    ambient: vec4f,        // rgb, linear light
+    light_count: u32,
+    pad_0: u32,
+    pad_1: u32,
+    pad_2: u32,
+}
+
+struct Light {
+    place: vec4f,          // w = 1: camera-relative position; w = 0: unit direction towards the light
+    color: vec4f,          // rgb, linear: irradiance, for a position at distance 1
+}
+
+@group(0) @binding(0) var<uniform> frame: FrameInfo;
+@group(0) @binding(1) var<storage, read> lights: array<Light>;

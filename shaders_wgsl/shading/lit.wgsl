@@ -1,0 +1,45 @@
+// All lights on one point. Needs a `shading/shadow_*.wgsl`.
+#import "bindings/draw.wgsl"
+#import "bindings/frame.wgsl"
+#import "bindings/material.wgsl"
+#import "lib/blinn_phong.wgsl"
+#import "lib/normalize.wgsl"
+
+struct Lit {
+    color: vec3f,          // linear
+    shadow_rays: u32,      // lights tested
+    blocked: f32,          // share of the lights facing the point that the relief hides
+}
+
+// `position`: camera-relative world; `normal`: unit, world.
+fn lit(albedo: vec3f, position: vec3f, normal: vec3f, point: ShadowPoint) -> Lit {
+    let to_eye = normalize_or(-position, normal);
+    var result: Lit;
+    result.color = albedo * frame.ambient.rgb;
+    var facing = 0u;
+    var blocked = 0u;
+    for (var i = 0u; i < frame.light_count; i++) {
+        let light = lights[i];
+        let distant = light.place.w == 0.0;
+        let offset = light.place.xyz - light.place.w * position;
+        let to_light = normalize_or(offset, normal);
+        if dot(normal, to_light) <= 0.0 {
+            continue;
+        }
+        facing += 1u;
+        if tests_shadows() {
+            let offset_object = (draw.object_from_relative * vec4f(offset, 0.0)).xyz;
+            result.shadow_rays += 1u;
+            if shadowed(point, offset_object, distant) {
+                blocked += 1u;
+                continue;
+            }
+        }
+        let falloff = select(1.0 / max(dot(offset, offset), 1e-12), 1.0, distant);
+        result.color += blinn_phong(
+            normal, to_light, to_eye, albedo, light.color.rgb * falloff,
+            material.specular, material.shininess);
+    }
+    result.blocked = f32(blocked) / f32(max(facing, 1u));
+    return result;
+}

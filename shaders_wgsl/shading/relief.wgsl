@@ -1,0 +1,47 @@
+// The march of one fragment: from the mesh surface to the hit, its normal and its light.
+#import "lib/found.wgsl"
+#import "lib/texture_ray.wgsl"
+#import "shading/shadow_search.wgsl"
+#import "shading/shade.wgsl"
+#import "lib/surface_point.wgsl"
+
+struct ReliefTargets {
+    @location(0) color: vec4f,
+    @location(1) trace: u32,
+    @location(2) place: vec4f,
+    @location(3) position: vec4f,
+    @location(4) normal: vec4f,
+    @location(5) ray_start: vec4f,
+    @location(6) ray_delta: vec4f,
+    @builtin(frag_depth) depth: f32,
+}
+
+// `position`: of the mesh surface, object space; `point.uv`: there.
+fn shade_relief(position: vec3f, point: SurfacePoint) -> ReliefTargets {
+    let direction = position - draw.eye.xyz;
+    let ray = texture_ray(
+        point.surface, direction, point.uv, material.scale, material.base, material.period);
+    let found = search(ray.start, ray.delta, ray.cos_theta);
+
+    let hit = ray.start + ray.delta * found.tau;
+    let hit_position = position + direction * (ray.t_start + found.tau * ray.t_length);
+    var at_hit = point;
+    at_hit.uv = hit.xy;
+    let normal = world_normal(shading_normal(at_hit));
+    let albedo = albedo_at(hit.xy, point.uv_dx, point.uv_dy);
+    let relative = relative_position(hit_position);
+    let light = lit(albedo.rgb, relative, normal, ShadowPoint(point.surface, hit));
+
+    let depth = dot(relative, frame.forward.xyz);
+    var out: ReliefTargets;
+    out.color = displayable(light.color);
+    out.trace = pack_trace(TRACE_COVERED | TRACE_MARCHED, found.status, light.shadow_rays, found.steps);
+    out.place = vec4f(hit.xy + ray.tile, depth, hit.z);
+    out.position = vec4f(relative, light.blocked);
+    out.normal = vec4f(normal, ray.cos_theta);
+    out.ray_start = vec4f(ray.start, ray.tile.x);
+    out.ray_delta = vec4f(ray.delta, ray.tile.y);
+    // Reversed: 1 at the near plane, 0 at infinity, the same relative precision everywhere.
+    out.depth = clamp(frame.forward.w / max(depth, frame.forward.w), 0.0, 1.0);
+    return out;
+}
