@@ -1,0 +1,84 @@
+//! Which settings are worth having: nothing else is both faster and more accurate.
+
+use crate::Timing;
+
+/// One setting in the time-against-error plane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Candidate {
+    /// Time per ray with its spread.
+    pub time: Timing,
+    /// Error to trade against time, such as the 99th percentile in texels.
+    pub error: f64,
+    /// Whether it may be on the front at all: misses are a filter, not a trade.
+    pub eligible: bool,
+}
+
+/// Errors closer than this share are the same: percentiles of a sample are not sharper.
+const ERROR_SLACK: f64 = 1.0e-3;
+
+/// Whether `a` makes `b` pointless: it is not slower beyond the spread, not less accurate, and clearly
+/// better in one of the two.
+fn dominates(a: &Candidate, b: &Candidate) -> bool {
+    let more_accurate = a.error < b.error * (1.0 - ERROR_SLACK);
+    !b.time.clearly_faster(&a.time) && a.error <= b.error && (more_accurate || a.time.clearly_faster(&b.time))
+}
+
+/// Indices on the Pareto front, by rising median time.
+pub fn front(candidates: &[Candidate]) -> Vec<usize> {
+    let usable = |i: &usize| candidates[*i].eligible && candidates[*i].error.is_finite();
+    let mut front: Vec<usize> = (0..candidates.len())
+        .filter(usable)
+        .filter(|&i| !(0..candidates.len()).filter(usable).any(|j| dominates(&candidates[j], &candidates[i])))
+        .collect();
+    front.sort_by(|&a, &b| candidates[a].time.median_ns.total_cmp(&candidates[b].time.median_ns));
+    front
+}
+
+/// For each candidate the others whose time cannot be told from its own.
+pub fn ties(candidates: &[Candidate]) -> Vec<Vec<usize>> {
+    let tied =
+        |a: &Candidate, b: &Candidate| !a.time.clearly_faster(&b.time) && !b.time.clearly_faster(&a.time);
+    (0..candidates.len())
+        .map(|i| (0..candidates.len()).filter(|&j| j != i && tied(&candidates[i], &candidates[j])).collect())
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn candidate(time: f64, spread: f64, error: f64) -> Candidate {
+        let time = Timing { median_ns: time, low_ns: time - spread, high_ns: time + spread };
+        Candidate { time, error, eligible: true }
+    }
+
+    #[test]
+    fn slower_and_worse_is_off_the_front() {
+        let all = [
+            candidate(1.0, 0.0, 9.0),
+            candidate(2.0, 0.0, 1.0),
+            candidate(3.0, 0.0, 2.0),
+            candidate(4.0, 0.0, 0.1),
+        ];
+        assert_eq!(front(&all), [0, 1, 3]);
+    }
+
+    #[test]
+    fn misses_filter_before_anything_is_traded() {
+        let mut all = [candidate(1.0, 0.0, 0.1), candidate(2.0, 0.0, 0.5)];
+        assert_eq!(front(&all), [0]);
+        all[0].eligible = false;
+        assert_eq!(front(&all), [1]);
+        all[1].error = f64::NAN;
+        assert!(front(&all).is_empty());
+    }
+
+    #[test]
+    fn a_lead_within_the_noise_does_not_count() {
+        let all = [candidate(1.00, 0.1, 5.0), candidate(1.05, 0.1, 1.0)];
+        assert_eq!(front(&all), [1], "the accurate one is not slower beyond the spread");
+        assert_eq!(ties(&all), [vec![1], vec![0]]);
+        let equal = [candidate(1.00, 0.1, 1.0), candidate(1.05, 0.1, 1.0)];
+        assert_eq!(front(&equal), [0, 1], "a tie in both stays a tie");
+    }
+}

@@ -1,0 +1,82 @@
+//! Time per ray: warmed up, repeated in turns, with its spread.
+
+use std::time::Instant;
+
+use heightfield::{HeightField, Hits, MarchOptions, OutputSet, RayArray, Technique, march};
+
+use crate::{CompareError, Rays};
+
+/// A device that can march, such as a GPU.
+pub trait DeviceMarch {
+    /// Marches the rays; returns the hits and the seconds that the device itself took.
+    ///
+    /// # Errors
+    /// A message for the user.
+    fn march(&self, field: &HeightField, technique: &Technique, rays: &Rays) -> Result<(Hits, f64), String>;
+}
+
+/// Nanoseconds per ray over several repeats.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Timing {
+    /// Median.
+    pub median_ns: f64,
+    /// Lower quartile.
+    pub low_ns: f64,
+    /// Upper quartile.
+    pub high_ns: f64,
+}
+
+impl Timing {
+    /// Median and quartiles of repeats; `None` without any.
+    pub fn of(samples_ns: &[f64]) -> Option<Self> {
+        let mut sorted = samples_ns.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let at = |rank: f64| -> Option<f64> {
+            let x = rank * (sorted.len().checked_sub(1)?) as f64;
+            let (low, high) = (sorted.get(x.floor() as usize)?, sorted.get(x.ceil() as usize)?);
+            Some(low + (high - low) * x.fract())
+        };
+        Some(Self { median_ns: at(0.5)?, low_ns: at(0.25)?, high_ns: at(0.75)? })
+    }
+
+    /// Whether this is faster beyond the spread of both: the quartile ranges do not meet.
+    pub fn clearly_faster(&self, other: &Self) -> bool {
+        self.high_ns < other.low_ns
+    }
+}
+
+/// Seconds that the CPU, on all its cores, takes to find the hit positions of these rays.
+///
+/// # Errors
+/// Whatever [`march`] refuses.
+pub fn time_cpu(field: &HeightField, technique: &Technique, rays: &Rays) -> Result<f64, CompareError> {
+    let options = MarchOptions { outputs: OutputSet::UV, ..MarchOptions::default() };
+    let start = Instant::now();
+    let hits =
+        march(field, technique, RayArray::F32(&rays.origins), RayArray::F32(&rays.directions), &options)?;
+    let seconds = start.elapsed().as_secs_f64();
+    std::hint::black_box(&hits);
+    Ok(seconds)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_slow_repeat_does_not_move_the_median() {
+        let timing = Timing::of(&[5.0, 5.1, 900.0, 4.9, 5.0]).unwrap();
+        assert_eq!(timing.median_ns, 5.0);
+        assert!(timing.high_ns <= 5.1);
+        assert!(Timing::of(&[]).is_none());
+    }
+
+    #[test]
+    fn overlapping_spreads_are_a_tie() {
+        let a = Timing::of(&[1.0, 2.0, 3.0]).unwrap();
+        let b = Timing::of(&[2.0, 3.0, 4.0]).unwrap();
+        let c = Timing::of(&[9.0, 9.1, 9.2]).unwrap();
+        assert!(!a.clearly_faster(&b) && !b.clearly_faster(&a));
+        assert!(a.clearly_faster(&c) && !c.clearly_faster(&a));
+    }
+}
