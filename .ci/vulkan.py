@@ -10,7 +10,7 @@ import sys
 class InstanceCreateInfo(ctypes.Structure):
     """VkInstanceCreateInfo with no application info, layers or extensions."""
 
-    _fields_ = [  # noqa: RUF012
+    _fields_ = [
         ("s_type", ctypes.c_int32),
         ("next", ctypes.c_void_p),
         ("flags", ctypes.c_uint32),

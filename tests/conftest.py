@@ -18,7 +18,7 @@ def root() -> Path:
 
 @pytest.fixture(scope="session")
 def assets() -> Path:
-    """The folder of real assets, which are not part of the project: `BUMPWGPU_TEST_DATA` or ../shared/data."""
+    """Real assets, not part of the project: the folder BUMPWGPU_TEST_DATA, or ../shared/data."""
     folder = Path(os.environ.get("BUMPWGPU_TEST_DATA", ROOT.parent / "shared" / "data"))
     if not folder.is_dir():
         pytest.skip(f"no real assets in {folder}")

@@ -43,8 +43,9 @@ def test_python_blocks_run(page: Path, tmp_path: Path) -> None:
 
 @pytest.mark.gpu
 def test_command_line_blocks_run(tmp_path: Path) -> None:
-    import bumpwgpu as bw
     from PIL import Image
+
+    import bumpwgpu as bw
 
     heights = bw.HeightMap.procedural("bricks", size=64).array
     Image.fromarray((heights * 65535).astype("uint16")).save(tmp_path / "height.png")
