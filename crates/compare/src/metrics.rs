@@ -102,6 +102,19 @@ impl RayErrors {
         }
         Ok(errors)
     }
+
+    /// The errors of some rows, by their place in the arrays; shadow counts are left out.
+    pub fn select(&self, keep: impl Fn(usize) -> bool) -> Self {
+        let mut part = Self::default();
+        for i in (0..self.outcome.len()).filter(|&i| keep(i)) {
+            part.uv_texels.push(self.uv_texels[i]);
+            part.depth.push(self.depth[i]);
+            part.normal_deg.push(self.normal_deg[i]);
+            part.outcome.push(self.outcome[i]);
+            part.steps.push(self.steps[i]);
+        }
+        part
+    }
 }
 
 impl Reported<'_> {
