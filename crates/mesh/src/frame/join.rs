@@ -1,0 +1,65 @@
+//! From one tangent a corner back to one tangent a vertex.
+
+use std::collections::HashMap;
+
+use glam::{Vec3, Vec4};
+
+use super::convention;
+use crate::error::MeshError;
+use crate::limits::check_elements;
+
+/// Tangents a vertex, and how the vertices came about.
+///
+/// Vertices are only ever split, never merged: the first `n` vertices are the given ones in their
+/// order, copies for further tangents follow. To carry any other attribute over, take
+/// `attribute[source[i]]` for each new vertex `i`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Split {
+    /// For each new vertex, the given vertex it is or copies.
+    pub source: Vec<u32>,
+    /// Triangles over the new vertices, in the given order.
+    pub indices: Vec<[u32; 3]>,
+    /// glTF tangents of the new vertices.
+    pub tangents: Vec<Vec4>,
+    /// What had to be replaced.
+    pub warnings: Vec<String>,
+}
+
+/// Joins corners of one vertex that have the same tangent, bit for bit.
+pub(super) fn join(
+    vertices: usize,
+    normals: &[Vec3],
+    indices: &[[u32; 3]],
+    corners: &[Vec4],
+    warnings: Vec<String>,
+) -> Result<Split, MeshError> {
+    let mut first: Vec<Option<Vec4>> = vec![None; vertices];
+    let mut extra: HashMap<(u32, [u32; 4]), u32> = HashMap::new();
+    let mut source: Vec<u32> = (0..vertices as u32).collect();
+    let mut copies: Vec<Vec4> = Vec::new();
+    let mut joined = Vec::with_capacity(indices.len());
+    for (triangle, tangents) in indices.iter().zip(corners.chunks_exact(3)) {
+        let mut row = [0; 3];
+        for ((slot, &vertex), &tangent) in row.iter_mut().zip(triangle).zip(tangents) {
+            let known = *first[vertex as usize].get_or_insert(tangent);
+            *slot = if known == tangent {
+                vertex
+            } else {
+                *extra.entry((vertex, tangent.to_array().map(f32::to_bits))).or_insert_with(|| {
+                    source.push(vertex);
+                    copies.push(tangent);
+                    source.len() as u32 - 1
+                })
+            };
+        }
+        joined.push(row);
+    }
+    check_elements("vertices after splitting for tangents", source.len())?;
+    let mut tangents: Vec<Vec4> = first
+        .into_iter()
+        .zip(normals)
+        .map(|(tangent, &normal)| tangent.unwrap_or_else(|| convention::any_tangent(normal)))
+        .collect();
+    tangents.append(&mut copies);
+    Ok(Split { source, indices: joined, tangents, warnings })
+}

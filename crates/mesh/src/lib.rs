@@ -1,0 +1,28 @@
+//! Triangle meshes: loading, generating, and the tangent frames that carry relief across them.
+//!
+//! Conventions: right-handed axes with +Y up; UV origin at the top left of the image with `v`
+//! *down*, as in glTF. OBJ counts `v` upwards and is flipped in its reader and nowhere else.
+//! Counter-clockwise triangles face the viewer. Lengths are in mesh units.
+//!
+//! [`Mesh::open`] reads OBJ, glTF and GLB; [`Mesh::quad`], [`Mesh::cube`], [`Mesh::sphere`] and
+//! [`Mesh::torus`] generate shapes whose derivatives are exact; [`Mesh::from_arrays`] takes plain
+//! arrays. [`tangents`] alone turns arrays into arrays.
+//!
+//! Readers answer bad files with a [`MeshError`]. What could be repaired or had to be left out is
+//! listed in [`Mesh::warnings`].
+
+pub mod arrays;
+pub mod error;
+pub mod frame;
+pub mod generate;
+mod gltf;
+pub mod limits;
+pub mod material;
+mod mesh;
+mod normals;
+mod obj;
+
+pub use error::MeshError;
+pub use frame::{Derivatives, FrameMethod, Split, derivatives, tangents};
+pub use material::{ImageSource, MaterialSource};
+pub use mesh::{Mesh, Part};

@@ -1,0 +1,94 @@
+//! Splits polygons into triangles.
+
+use glam::{DVec2, DVec3};
+
+/// Concave polygons with more corners than this are split as fans: ear clipping takes quadratic
+/// time or worse, and nobody models such faces.
+const MAX_EARS: usize = 512;
+
+/// Triangles over the corners of a polygon: a fan from the first corner when it is convex, as other
+/// readers do, else by clipping ears (Meisters 1975).
+pub(super) fn triangulate(outline: &[DVec3]) -> Vec<[usize; 3]> {
+    let fan = || (2..outline.len()).map(|i| [0, i - 1, i]).collect();
+    if outline.len() <= 3 || outline.len() > MAX_EARS {
+        return fan();
+    }
+    let flat = project(outline);
+    let count = flat.len();
+    if (0..count).all(|i| turn(flat[i], flat[(i + 1) % count], flat[(i + 2) % count]) >= 0.0) {
+        return fan();
+    }
+    let mut left: Vec<usize> = (0..count).collect();
+    let mut triangles = Vec::with_capacity(count - 2);
+    while left.len() > 3 {
+        let Some(at) = (0..left.len()).find(|&at| is_ear(&flat, &left, at)) else { break };
+        let n = left.len();
+        triangles.push([left[(at + n - 1) % n], left[at], left[(at + 1) % n]]);
+        left.remove(at);
+    }
+    // Outlines that cross themselves may run out of ears: the rest becomes a fan.
+    triangles.extend((2..left.len()).map(|i| [left[0], left[i - 1], left[i]]));
+    triangles
+}
+
+/// The outline in the plane of its area vector (Newell), counter-clockwise.
+fn project(outline: &[DVec3]) -> Vec<DVec2> {
+    let next = outline.iter().cycle().skip(1);
+    let area: DVec3 = outline.iter().zip(next).map(|(a, b)| (a - outline[0]).cross(b - outline[0])).sum();
+    let normal = area.try_normalize().unwrap_or(DVec3::Z);
+    let (x, y) = normal.any_orthonormal_pair();
+    outline.iter().map(|p| DVec2::new((p - outline[0]).dot(x), (p - outline[0]).dot(y))).collect()
+}
+
+fn turn(a: DVec2, b: DVec2, c: DVec2) -> f64 {
+    (b - a).perp_dot(c - b)
+}
+
+/// Whether the corner at `at` sticks out and no other corner lies in its triangle.
+fn is_ear(flat: &[DVec2], left: &[usize], at: usize) -> bool {
+    let n = left.len();
+    let [a, b, c] = [left[(at + n - 1) % n], left[at], left[(at + 1) % n]].map(|i| flat[i]);
+    let inside = |p: DVec2| {
+        p != a && p != b && p != c && turn(a, b, p) >= 0.0 && turn(b, c, p) >= 0.0 && turn(c, a, p) >= 0.0
+    };
+    turn(a, b, c) > 0.0 && !left.iter().any(|&i| inside(flat[i]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn area(outline: &[DVec3], triangles: &[[usize; 3]]) -> f64 {
+        let half = |t: &[usize; 3]| {
+            let [a, b, c] = t.map(|i| outline[i]);
+            (b - a).cross(c - a).z / 2.0
+        };
+        assert!(triangles.iter().all(|t| half(t) > -1e-12), "{triangles:?}");
+        triangles.iter().map(half).sum()
+    }
+
+    #[test]
+    fn convex_polygons_are_fans() {
+        let square = [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y];
+        assert_eq!(triangulate(&square), vec![[0, 1, 2], [0, 2, 3]]);
+    }
+
+    #[test]
+    fn concave_polygons_cover_their_area_once() {
+        let points = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [2.0, 1.0], [0.0, 4.0]];
+        let outline = points.map(|[x, y]| DVec3::new(x, y, 0.0));
+        // Shoelace by hand: the 4 x 4 square less the notch of 4 * 3 / 2.
+        for shift in 0..5 {
+            let mut turned = outline;
+            turned.rotate_left(shift);
+            assert!((area(&turned, &triangulate(&turned)) - 10.0).abs() < 1e-12, "shift {shift}");
+        }
+    }
+
+    #[test]
+    fn senseless_polygons_still_end() {
+        for outline in [vec![DVec3::ZERO; 9], (0..9).map(|i| DVec3::X * f64::from(i % 3)).collect()] {
+            assert_eq!(triangulate(&outline).len(), 7);
+        }
+    }
+}
