@@ -53,15 +53,19 @@ pub fn recommend(entries: &[Entry], budget: &Budget) -> Advice {
         .min_by(|&a, &b| entries[a].error_texels.total_cmp(&entries[b].error_texels))
         .unwrap_or(fastest);
     let chosen = &entries[pick];
+    let rank = if within.len() == 1 {
+        "the only setting".to_owned()
+    } else {
+        format!("the least of the {} settings", within.len())
+    };
     let mut reason = format!(
-        "{} takes {:.1} ns a ray, the least of {} settings with a p99 error of at most {} texels and at most \
-         {} of rays failing; measured: {:.3} texels, {} failing.",
+        "{} takes {} ns a ray, {rank} with a p99 error of at most {} texels and at most {} of rays failing; \
+         measured: {} texels, {} failing.",
         chosen.label,
-        chosen.time.median_ns,
-        within.len(),
-        budget.max_error_texels,
+        digits(chosen.time.median_ns),
+        digits(budget.max_error_texels),
         percent(budget.max_failure_rate),
-        chosen.error_texels,
+        digits(chosen.error_texels),
         percent(chosen.failure_rate),
     );
     let others: Vec<&str> =
@@ -86,8 +90,10 @@ fn why_none(entries: &[Entry], reliable: &[usize], budget: &Budget) -> String {
     if let Some(best) = least(reliable, |e| e.error_texels) {
         return format!(
             "No setting has a p99 error of at most {} texels; the most accurate one that is reliable, {}, \
-             has {:.3}.",
-            budget.max_error_texels, entries[best].label, entries[best].error_texels
+             has {}.",
+            digits(budget.max_error_texels),
+            entries[best].label,
+            digits(entries[best].error_texels)
         );
     }
     let all: Vec<usize> = (0..entries.len()).collect();
@@ -104,7 +110,21 @@ fn why_none(entries: &[Entry], reliable: &[usize], budget: &Budget) -> String {
 }
 
 fn percent(share: f64) -> String {
-    if share == 0.0 { "0 %".to_owned() } else { format!("{:.3} %", share * 100.0) }
+    format!("{} %", digits(share * 100.0))
+}
+
+/// Three significant digits, with an exponent where that is shorter.
+fn digits(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let magnitude = value.abs().log10().floor() as i32;
+    if (-3..6).contains(&magnitude) {
+        let text = format!("{value:.*}", (2 - magnitude).max(0) as usize);
+        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+    } else {
+        format!("{value:.1e}")
+    }
 }
 
 #[cfg(test)]
@@ -128,7 +148,7 @@ mod tests {
         ];
         let advice = recommend(&all, &BUDGET);
         assert_eq!(advice.pick, Some(2));
-        assert!(advice.reason.contains("good") && advice.reason.contains("0.400"), "{}", advice.reason);
+        assert!(advice.reason.contains("good") && advice.reason.contains("0.4 texels"), "{}", advice.reason);
     }
 
     #[test]
@@ -140,11 +160,19 @@ mod tests {
     }
 
     #[test]
+    fn numbers_have_three_digits() {
+        let expected = [(0.0, "0"), (0.5, "0.5"), (1234.5, "1234"), (0.01234, "0.0123"), (2.4e-5, "2.4e-5")];
+        for (value, text) in expected {
+            assert_eq!(digits(value), text);
+        }
+    }
+
+    #[test]
     fn says_why_nothing_qualifies() {
         let inaccurate = recommend(&[entry("a", 1.0, 0.0, 3.0, 0.0)], &BUDGET);
-        assert!(inaccurate.pick.is_none() && inaccurate.reason.contains("3.000"), "{}", inaccurate.reason);
+        assert!(inaccurate.pick.is_none() && inaccurate.reason.contains("has 3."), "{}", inaccurate.reason);
         let leaky = recommend(&[entry("a", 1.0, 0.0, 0.1, 0.5)], &BUDGET);
-        assert!(leaky.pick.is_none() && leaky.reason.contains("50.000 %"), "{}", leaky.reason);
+        assert!(leaky.pick.is_none() && leaky.reason.contains("50 %"), "{}", leaky.reason);
         assert!(recommend(&[], &BUDGET).pick.is_none());
     }
 }
