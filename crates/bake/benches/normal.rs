@@ -1,0 +1,41 @@
+//! Normal map of a 4096 x 4096 height field, by kernel.
+
+use std::hint::black_box;
+
+use bake::{Convention, Kernel, Progress, normal_map};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use heightfield::{Extent, HeightField, Wrap};
+
+const SIDE: usize = 4096;
+
+/// Sines along both axes: every texel differs from its neighbours and the normal is known.
+fn waves() -> HeightField {
+    let wave = |i: usize, periods: f32| (i as f32 * periods * std::f32::consts::TAU / SIDE as f32).sin();
+    let texels: Vec<f32> = (0..SIDE * SIDE)
+        .map(|at| 0.5 + 0.25 * wave(at % SIDE, 31.0) + 0.25 * wave(at / SIDE, 17.0))
+        .collect();
+    match HeightField::new(&texels, SIDE, SIDE, Wrap::Repeat) {
+        Ok(field) => field,
+        Err(error) => unreachable!("{error}"),
+    }
+}
+
+fn normals(criterion: &mut Criterion) {
+    let field = waves();
+    let extent = Extent { scale: 0.01, ..Extent::default() };
+    let bake = |kernel| {
+        normal_map(&field, &extent, kernel, Convention::OpenGl, Progress::none()).unwrap_or_default()
+    };
+    let map = bake(Kernel::Central);
+    let slope = 0.01 * 0.25 * 31.0 * std::f32::consts::TAU;
+    assert!((-map[0] / map[2] - slope).abs() < 1e-4 * slope, "wrong result: do not time it");
+    let mut group = criterion.benchmark_group("normal_4096");
+    group.throughput(Throughput::Elements((SIDE * SIDE) as u64)).sample_size(10);
+    for kernel in Kernel::ALL {
+        group.bench_function(kernel.name(), |bencher| bencher.iter(|| black_box(bake(kernel))));
+    }
+    group.finish();
+}
+
+criterion_group!(benches, normals);
+criterion_main!(benches);

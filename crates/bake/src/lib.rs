@@ -1,0 +1,35 @@
+//! Maps from height fields, and the image files they come from and go to.
+//!
+//! Data flows one way: [`files`] -> `heightfield::HeightField` -> [`slopes`] -> the maps
+//! ([`normal`], [`relief`], [`pyramid`]) -> [`encode`] -> [`files`]. [`maps`] lists all maps by name
+//! and drives them; a new map is one file here and one entry there.
+//!
+//! Conventions: row 0 is the top, `u` runs right and `v` down. Baked maps are `f32`: normals in
+//! -1..1 with +X right, +Y up, +Z out (OpenGL, glTF), heights in 0..1. Integers appear only when a
+//! map is saved.
+
+pub mod bits;
+pub mod encode;
+pub mod error;
+pub mod files;
+pub mod image;
+pub mod kernel;
+pub mod maps;
+pub mod normal;
+pub mod progress;
+pub mod pyramid;
+pub mod relief;
+mod rows;
+pub mod slopes;
+
+pub use bits::effective_bits;
+pub use error::BakeError;
+pub use files::{WriteOptions, decode_image, read_image, write_image, write_image_with};
+pub use image::{Image, Samples};
+pub use kernel::Kernel;
+pub use maps::{BakeOptions, Baked, FileFormat, Layer, Map, bake, save};
+pub use normal::{Convention, normal_map, normal_xy};
+pub use progress::Progress;
+pub use pyramid::{Level, pyramid};
+pub use relief::relief_map;
+pub use slopes::slopes;

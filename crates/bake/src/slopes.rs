@@ -1,0 +1,27 @@
+//! Slopes of a height field at its texel centres.
+
+use heightfield::HeightField;
+
+use crate::rows::for_each_row;
+use crate::{BakeError, Kernel, Progress};
+
+/// Slopes `[dh/du, dh/dv]` at the texel centres, height per tile, `u` right and `v` **down**.
+///
+/// `height * width` pairs, row by row. Multiply by `scale / tile_size` for mesh units.
+///
+/// # Errors
+/// [`BakeError::Interrupted`].
+pub fn slopes(
+    field: &HeightField,
+    kernel: Kernel,
+    mut progress: Progress<'_>,
+) -> Result<Vec<[f32; 2]>, BakeError> {
+    let (width, height) = (field.width() as f32, field.height() as f32);
+    let mut slopes = vec![[0.0; 2]; field.width() * field.height()];
+    for_each_row(field, kernel, &mut slopes, &mut progress, |row, out, _| {
+        for ((slope, gx), gy) in out.iter_mut().zip(row.gx).zip(row.gy) {
+            *slope = [gx * width, gy * height];
+        }
+    })?;
+    Ok(slopes)
+}
