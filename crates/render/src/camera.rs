@@ -1,0 +1,120 @@
+//! The camera, in `f64`: positions reach the device relative to it.
+
+use glam::{DMat4, DVec3, DVec4, Vec3};
+
+use crate::RenderError;
+
+/// Distance of the near plane as a share of the distance to the target. Depth is a reversed float with
+/// no far plane, which resolves near and far alike, so nearly nothing need be clipped.
+const NEAR_SHARE: f64 = 1e-5;
+
+/// A perspective camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Camera {
+    /// Where it stands, world space.
+    pub eye: DVec3,
+    /// What it looks at.
+    pub target: DVec3,
+    /// What is up in the picture.
+    pub up: DVec3,
+    /// Vertical field of view, radians.
+    pub fov_y: f64,
+}
+
+impl Camera {
+    /// A camera at `eye` that looks at `target`, +Y up, 45 degrees high.
+    pub fn look_at(eye: DVec3, target: DVec3) -> Self {
+        Self { eye, target, up: DVec3::Y, fov_y: 45.0_f64.to_radians() }
+    }
+
+    /// The unit view axis.
+    pub fn forward(&self) -> DVec3 {
+        (self.target - self.eye).normalize_or_zero()
+    }
+
+    /// Unit axes to the right and up in the picture, and into it.
+    fn axes(&self) -> (DVec3, DVec3, DVec3) {
+        let forward = self.forward();
+        let right = forward.cross(self.up).normalize_or_zero();
+        (right, right.cross(forward), forward)
+    }
+
+    /// Distance of the near plane, world units.
+    pub fn near(&self) -> f64 {
+        (self.target - self.eye).length() * NEAR_SHARE
+    }
+
+    /// # Errors
+    /// [`RenderError::Camera`].
+    pub fn validate(&self) -> Result<(), RenderError> {
+        let fail = |problem: String| Err(RenderError::Camera(problem));
+        for (name, vector) in [("eye", self.eye), ("target", self.target), ("up", self.up)] {
+            if !vector.is_finite() || vector.abs().max_element() > 1e30 {
+                return fail(format!("{name} is {vector}; it must be finite"));
+            }
+        }
+        if !(self.fov_y > 1e-4 && self.fov_y < std::f64::consts::PI - 1e-4) {
+            return fail(format!(
+                "field of view is {} degrees; it must be in 0..180",
+                self.fov_y.to_degrees()
+            ));
+        }
+        let forward = self.forward();
+        if !(self.near() > 1e-30) || forward == DVec3::ZERO {
+            return fail(format!("eye and target are both at {}", self.eye));
+        }
+        if forward.cross(self.up.normalize_or_zero()).length() < 1e-6 {
+            return fail(format!("up {} is zero or along the view direction {forward}", self.up));
+        }
+        Ok(())
+    }
+
+    /// Projection of camera-relative world positions onto rows `first_row..first_row + rows` of a
+    /// picture of `size` pixels: 1 at the near plane, 0 at infinity.
+    pub fn clip_from_relative(&self, size: [u32; 2], first_row: u32, rows: u32) -> DMat4 {
+        let [width, height] = size.map(f64::from);
+        let (right, up, forward) = self.axes();
+        let view = DMat4::from_cols(right.extend(0.0), up.extend(0.0), (-forward).extend(0.0), DVec4::W).transpose();
+        let focal = 1.0 / (0.5 * self.fov_y).tan();
+        let projection = DMat4::from_cols(
+            DVec4::X * (focal * height / width),
+            DVec4::Y * focal,
+            DVec4::new(0.0, 0.0, 0.0, -1.0),
+            DVec4::Z * self.near(),
+        );
+        let (first, rows) = (f64::from(first_row), f64::from(rows));
+        let centre = 1.0 - (2.0 * first + rows) / height;
+        let share = height / rows;
+        let mut band = DMat4::IDENTITY;
+        band.y_axis.y = share;
+        band.w_axis.y = -centre * share;
+        band * projection * view
+    }
+
+    /// Whether a ball in camera-relative world space lies wholly outside a picture of that aspect.
+    pub fn misses_ball(&self, aspect: f64, centre: DVec3, radius: f64) -> bool {
+        let (right, up, forward) = self.axes();
+        let tangent_y = (0.5 * self.fov_y).tan();
+        let tangent_x = tangent_y * aspect;
+        if centre.dot(forward) < -radius {
+            return true;
+        }
+        [(right, tangent_x), (-right, tangent_x), (up, tangent_y), (-up, tangent_y)].iter().any(
+            |&(side, tangent)| {
+                // Outward normal of the side plane through the eye.
+                let outward = (side - forward * tangent) / tangent.hypot(1.0);
+                centre.dot(outward) > radius
+            },
+        )
+    }
+
+    /// Unit direction through the middle of a pixel, world axes.
+    pub fn direction(&self, size: [u32; 2], x: u32, y: u32) -> Vec3 {
+        let (right, up, forward) = self.axes();
+        let [width, height] = size.map(f64::from);
+        let tangent = (0.5 * self.fov_y).tan();
+        let across = (2.0 * (f64::from(x) + 0.5) / width - 1.0) * tangent * width / height;
+        let above = (1.0 - 2.0 * (f64::from(y) + 0.5) / height) * tangent;
+        (forward + right * across + up * above).normalize().as_vec3()
+    }
+}

@@ -1,0 +1,120 @@
+//! Bind group layouts, made once a device.
+
+use wgpu::{
+    BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingType, BufferBindingType,
+    SamplerBindingType, ShaderStages, TextureSampleType, TextureViewDimension,
+};
+
+/// What a surface binds in group 2 besides the albedo.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum MaterialMaps {
+    /// Nothing.
+    None,
+    /// One filtered map at bindings 3 and 4.
+    Map,
+    /// The map, and the normalisation cube at 5 and 6.
+    MapAndCube,
+}
+
+/// All layouts.
+pub struct Layouts {
+    /// Group 0 of the renderer.
+    pub frame: BindGroupLayout,
+    /// Group 1: heights through a sampler.
+    pub heights: BindGroupLayout,
+    /// Group 1: corners and pyramid.
+    pub pyramid: BindGroupLayout,
+    /// Group 3.
+    pub draw: BindGroupLayout,
+    /// Group 0 of the march kernel.
+    pub march: BindGroupLayout,
+    material: [BindGroupLayout; 3],
+}
+
+impl Layouts {
+    /// Makes the layouts. `filterable`: whether the device filters 32-bit floats.
+    pub fn new(device: &wgpu::Device, filterable: bool) -> Self {
+        let make = |label: &str, entries: &[BindGroupLayoutEntry]| {
+            device.create_bind_group_layout(&BindGroupLayoutDescriptor { label: Some(label), entries })
+        };
+        let seen = ShaderStages::FRAGMENT | ShaderStages::COMPUTE;
+        let heights_filter =
+            if filterable { SamplerBindingType::Filtering } else { SamplerBindingType::NonFiltering };
+        let material = [
+            entry(0, ShaderStages::FRAGMENT, uniform()),
+            entry(1, ShaderStages::FRAGMENT, texture(true, TextureViewDimension::D2)),
+            entry(2, ShaderStages::FRAGMENT, BindingType::Sampler(SamplerBindingType::Filtering)),
+            entry(3, ShaderStages::FRAGMENT, texture(true, TextureViewDimension::D2)),
+            entry(4, ShaderStages::FRAGMENT, BindingType::Sampler(SamplerBindingType::Filtering)),
+            entry(5, ShaderStages::FRAGMENT, texture(true, TextureViewDimension::Cube)),
+            entry(6, ShaderStages::FRAGMENT, BindingType::Sampler(SamplerBindingType::Filtering)),
+        ];
+        Self {
+            frame: make(
+                "frame",
+                &[
+                    entry(0, ShaderStages::VERTEX_FRAGMENT, uniform()),
+                    entry(1, ShaderStages::VERTEX_FRAGMENT, storage(true)),
+                ],
+            ),
+            heights: make(
+                "heights",
+                &[
+                    entry(0, seen, texture(filterable, TextureViewDimension::D2)),
+                    entry(1, seen, BindingType::Sampler(heights_filter)),
+                    entry(2, seen, uniform()),
+                ],
+            ),
+            pyramid: make(
+                "pyramid",
+                &[entry(0, seen, storage(true)), entry(1, seen, storage(true)), entry(2, seen, uniform())],
+            ),
+            draw: make("draw", &[entry(0, ShaderStages::VERTEX_FRAGMENT, uniform())]),
+            march: make(
+                "march",
+                &[
+                    entry(0, ShaderStages::COMPUTE, storage(true)),
+                    entry(1, ShaderStages::COMPUTE, storage(false)),
+                ],
+            ),
+            material: [
+                make("material", &material[..3]),
+                make("material with a map", &material[..5]),
+                make("material with a map and a cube", &material),
+            ],
+        }
+    }
+
+    /// The layout of group 2.
+    pub fn material(&self, maps: MaterialMaps) -> &BindGroupLayout {
+        &self.material[match maps {
+            MaterialMaps::None => 0,
+            MaterialMaps::Map => 1,
+            MaterialMaps::MapAndCube => 2,
+        }]
+    }
+}
+
+fn entry(binding: u32, visibility: ShaderStages, ty: BindingType) -> BindGroupLayoutEntry {
+    BindGroupLayoutEntry { binding, visibility, ty, count: None }
+}
+
+fn uniform() -> BindingType {
+    BindingType::Buffer { ty: BufferBindingType::Uniform, has_dynamic_offset: false, min_binding_size: None }
+}
+
+fn storage(read_only: bool) -> BindingType {
+    BindingType::Buffer {
+        ty: BufferBindingType::Storage { read_only },
+        has_dynamic_offset: false,
+        min_binding_size: None,
+    }
+}
+
+fn texture(filterable: bool, view_dimension: TextureViewDimension) -> BindingType {
+    BindingType::Texture {
+        sample_type: TextureSampleType::Float { filterable },
+        view_dimension,
+        multisampled: false,
+    }
+}

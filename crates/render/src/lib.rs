@@ -1,0 +1,41 @@
+//! Renders meshes with any technique on a Vulkan device. The only crate that knows wgpu.
+//!
+//! Data flows one way: [`Scene`] and [`Request`] -> maps, buffers, pipelines (`prepare`) -> one pass a
+//! band of rows ([`render()`]) -> [`Frame`]. What a technique does not use is neither baked nor
+//! uploaded, bound or compiled; what it uses is kept on the [`Device`] as long as the height field or
+//! image it was made from. [`march()`] runs the same searches over rays of its own.
+//!
+//! Lengths are mesh (world) units, angles radians, colours linear light unless said to be sRGB.
+//! Positions reach the device relative to the camera, computed in `f64`.
+
+pub mod adapter;
+pub mod camera;
+pub mod device;
+pub mod error;
+pub mod frame;
+mod geometry;
+pub mod heights;
+mod layouts;
+pub mod march;
+mod pipeline;
+mod prepare;
+pub mod render;
+pub mod request;
+pub mod scene;
+pub mod surface;
+mod targets;
+pub mod texture;
+mod timer;
+pub mod uniforms;
+mod unpack;
+mod uploads;
+
+pub use adapter::{ADAPTER_VARIABLE, AdapterInfo, adapters};
+pub use camera::Camera;
+pub use device::{Device, DeviceOptions, device};
+pub use error::RenderError;
+pub use frame::{Aovs, Frame, Stats};
+pub use march::{DeviceHits, march, occluded};
+pub use render::{render, render_in_bands};
+pub use request::{AovSet, PLAIN_TECHNIQUES, Request, TechniqueChoice};
+pub use scene::{Draw, Light, Material, Scene};

@@ -1,0 +1,252 @@
+//! From a scene to what the device draws: maps, buffers, bind groups, pipelines.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+use std::time::Instant;
+
+use glam::{DMat4, Vec4};
+use mesh::Mesh;
+
+use crate::geometry::{Geometry, ball, centre};
+use crate::heights::bind;
+use crate::layouts::MaterialMaps;
+use crate::pipeline::{Pipeline, PipelineKey, ReadsKey, attributes, constants_of, reads_of};
+use crate::request::Program;
+use crate::targets::TargetSet;
+use crate::texture;
+use crate::uniforms::{DrawInfo, LightInfo, MaterialInfo, wrap_code};
+use crate::uploads::{Kind, Resource};
+use crate::{Device, Draw, Light, Material, RenderError, Request, Scene, Stats, TechniqueChoice};
+
+/// One draw, ready.
+pub(crate) struct Prepared {
+    pub pipeline: Arc<Pipeline>,
+    pub geometry: Arc<Geometry>,
+    pub locations: &'static [usize],
+    pub triangles: std::ops::Range<u32>,
+    pub field: Option<wgpu::BindGroup>,
+    pub material: wgpu::BindGroup,
+    pub draw: wgpu::BindGroup,
+}
+
+/// Prepares all draws that may be in the picture.
+pub(crate) fn draws(
+    device: &Device,
+    scene: &Scene<'_>,
+    request: &Request,
+    shadows: bool,
+    stats: &mut Stats,
+) -> Result<Vec<Prepared>, RenderError> {
+    let aspect = f64::from(request.width) / f64::from(request.height);
+    let mut meshes: HashMap<(*const Mesh, &'static [usize]), Arc<Geometry>> = HashMap::new();
+    let mut prepared = Vec::new();
+    for draw in &scene.draws {
+        let middle = centre(draw.mesh);
+        let relative_from_object = DMat4::from_translation(-scene.camera.eye)
+            * draw.world_from_object.as_dmat4()
+            * DMat4::from_translation(middle);
+        let count = u64::from(draw.triangles.end - draw.triangles.start);
+        let (ball_centre, radius) = ball(draw, relative_from_object);
+        if count == 0 || scene.camera.misses_ball(aspect, ball_centre, radius) {
+            stats.triangles_culled += count;
+            continue;
+        }
+        stats.triangles_drawn += count;
+
+        let program = request.technique.program(draw.material.normal.is_some());
+        let locations = attributes(program.entry);
+        let geometry = match meshes.get(&(std::ptr::from_ref(draw.mesh), locations)) {
+            Some(geometry) => Arc::clone(geometry),
+            None => {
+                let geometry = Arc::new(Geometry::new(device, draw.mesh, middle, locations)?);
+                meshes.insert((std::ptr::from_ref(draw.mesh), locations), Arc::clone(&geometry));
+                geometry
+            }
+        };
+        let reads = reads_of(&request.technique);
+        let field = reads.map(|reads| device.field_group(&draw.material.field, reads)).transpose()?;
+        let material = material_group(device, draw.material, program, stats)?;
+        let before = Instant::now();
+        let pipeline = device.pipeline(key(draw, request, program, shadows))?;
+        stats.compile_ms += before.elapsed().as_secs_f64() * 1e3;
+        prepared.push(Prepared {
+            pipeline,
+            geometry,
+            locations,
+            triangles: draw.triangles.clone(),
+            field,
+            material,
+            draw: draw_group(device, relative_from_object)?,
+        });
+    }
+    Ok(prepared)
+}
+
+fn key(draw: &Draw<'_>, request: &Request, program: Program, shadows: bool) -> PipelineKey {
+    let mut constants = Vec::new();
+    if let TechniqueChoice::Search(technique) = &request.technique {
+        constants = constants_of(technique);
+        constants.push(("cast_shadows", i64::from(shadows)));
+    }
+    PipelineKey {
+        program,
+        reads: reads_of(&request.technique).map(ReadsKey::from),
+        constants,
+        targets: TargetSet::of(request.aovs),
+        double_sided: draw.material.double_sided,
+        mirrored: draw.world_from_object.determinant() < 0.0,
+    }
+}
+
+fn draw_group(device: &Device, relative_from_object: DMat4) -> Result<wgpu::BindGroup, RenderError> {
+    let object_from_relative = relative_from_object.inverse();
+    let info = DrawInfo {
+        relative_from_object: relative_from_object.as_mat4(),
+        object_from_relative: object_from_relative.as_mat4(),
+        eye: object_from_relative.w_axis.as_vec4(),
+    };
+    let buffer = device.buffer_with("draw", bytemuck::bytes_of(&info), wgpu::BufferUsages::UNIFORM)?;
+    device.guard("binding a draw", || {
+        Ok(device.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("draw"),
+            layout: &device.layouts.draw,
+            entries: &[bind(0, buffer.as_entire_binding())],
+        }))
+    })
+}
+
+/// The lights as the shaders want them; never empty, since a buffer must not be.
+pub(crate) fn light_infos(scene: &Scene<'_>) -> Vec<LightInfo> {
+    let mut infos: Vec<LightInfo> = scene
+        .lights
+        .iter()
+        .map(|light| {
+            let (place, color, intensity) = match *light {
+                Light::Directional { direction, color, intensity } => {
+                    ((-direction.as_dvec3().normalize()).extend(0.0).as_vec4(), color, intensity)
+                }
+                Light::Point { position, color, intensity } => {
+                    ((position - scene.camera.eye).extend(1.0).as_vec4(), color, intensity)
+                }
+            };
+            let [r, g, b] = color;
+            LightInfo { place, color: Vec4::new(r, g, b, 0.0) * intensity }
+        })
+        .collect();
+    if infos.is_empty() {
+        infos.push(LightInfo { place: Vec4::Z, color: Vec4::ZERO });
+    }
+    infos
+}
+
+fn material_group(
+    device: &Device,
+    material: &Material,
+    program: Program,
+    stats: &mut Stats,
+) -> Result<wgpu::BindGroup, RenderError> {
+    let field = &material.field;
+    let extent = field.extent();
+    let info = MaterialInfo {
+        albedo_factor: Vec4::from(material.albedo_factor),
+        map_width: field.width() as f32,
+        map_height: field.height() as f32,
+        scale: extent.scale,
+        base: extent.base,
+        specular: material.specular,
+        shininess: material.shininess,
+        period: heightfield::march::period(field.wrap()) as f32,
+        wrap: wrap_code(field.wrap()),
+    };
+    let info = device.buffer_with("material", bytemuck::bytes_of(&info), wgpu::BufferUsages::UNIFORM)?;
+    let albedo = match &material.albedo {
+        Some(image) => {
+            view(device.keep(image, Kind::Albedo, || {
+                let levels = texture::albedo(image);
+                texture::upload(device, "albedo", wgpu::TextureFormat::Rgba8UnormSrgb, &levels, false)
+                    .map(Resource::View)
+            })?)?
+            .0
+        }
+        None => device.keep_white(|| {
+            texture::upload(device, "white", wgpu::TextureFormat::Rgba8UnormSrgb, &texture::white(), false)
+        })?,
+    };
+    let sampler = texture::sampler(device, field.wrap(), true);
+    let map = if program.maps == MaterialMaps::None {
+        None
+    } else {
+        Some(surface_map(device, material, program, stats)?)
+    };
+    let cube =
+        if program.maps == MaterialMaps::MapAndCube {
+            let levels = texture::normalization_cube();
+            Some(device.keep_cube(|| {
+                texture::upload(device, "cube", wgpu::TextureFormat::Rgba8Unorm, &levels, true)
+            })?)
+        } else {
+            None
+        };
+    let cube_sampler = texture::sampler(device, heightfield::Wrap::Clamp, true);
+
+    let mut entries = vec![
+        bind(0, info.as_entire_binding()),
+        bind(1, wgpu::BindingResource::TextureView(&albedo)),
+        bind(2, wgpu::BindingResource::Sampler(&sampler)),
+    ];
+    if let Some(map) = &map {
+        entries.push(bind(3, wgpu::BindingResource::TextureView(map)));
+        entries.push(bind(4, wgpu::BindingResource::Sampler(&sampler)));
+    }
+    if let Some(cube) = &cube {
+        entries.push(bind(5, wgpu::BindingResource::TextureView(cube)));
+        entries.push(bind(6, wgpu::BindingResource::Sampler(&cube_sampler)));
+    }
+    device.guard("binding a material", || {
+        Ok(device.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("material"),
+            layout: device.layouts.material(program.maps),
+            entries: &entries,
+        }))
+    })
+}
+
+/// The map at binding 3, baked if the device does not have it.
+fn surface_map(
+    device: &Device,
+    material: &Material,
+    program: Program,
+    stats: &mut Stats,
+) -> Result<wgpu::TextureView, RenderError> {
+    let field = &material.field;
+    let eight_bits = program.surface == "dot3";
+    let upload = |label, format, levels: &[texture::MipLevel]| {
+        texture::upload(device, label, format, levels, false).map(Resource::View)
+    };
+    let (view, made) = view(match (&material.normal, eight_bits) {
+        (Some(image), false) => device.keep(image, Kind::OwnNormals, || {
+            upload("normals", wgpu::TextureFormat::Rgba16Float, &texture::own(image))
+        })?,
+        (Some(image), true) => device.keep(image, Kind::OwnNormals8Bit, || {
+            upload("normals", wgpu::TextureFormat::Rgba8Unorm, &texture::own_8_bit(image))
+        })?,
+        (None, false) => device.keep(field, Kind::Slopes, || {
+            upload("slopes", wgpu::TextureFormat::Rg16Float, &texture::slopes(field)?)
+        })?,
+        (None, true) => device.keep(field, Kind::Baked8Bit, || {
+            upload("normals", wgpu::TextureFormat::Rgba8Unorm, &texture::baked_8_bit(field)?)
+        })?,
+    })?;
+    stats.maps_baked += u32::from(made && material.normal.is_none());
+    Ok(view)
+}
+
+fn view((resource, made): (Resource, bool)) -> Result<(wgpu::TextureView, bool), RenderError> {
+    match resource {
+        Resource::View(view) => Ok((view, made)),
+        Resource::Group(_) => Err(RenderError::Device {
+            during: "looking up a map",
+            message: "a bind group was kept in its place".to_owned(),
+        }),
+    }
+}

@@ -1,0 +1,18 @@
+//! From maps to textures.
+
+mod albedo;
+mod cube;
+mod mips;
+mod normals;
+mod slopes;
+mod upload;
+
+pub(crate) use albedo::{albedo, white};
+pub(crate) use cube::normalization_cube;
+pub(crate) use normals::{baked_8_bit, own, own_8_bit};
+pub(crate) use slopes::slopes;
+pub(crate) use upload::{MipLevel, sampler, upload};
+
+pub use albedo::{linear_from_srgb, srgb_from_linear};
+pub use mips::halve;
+pub use normals::unit_normals;

@@ -1,0 +1,136 @@
+//! Structs shared with the shaders. A test compares them with naga's layout.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{Mat4, Vec4};
+
+/// Twin of `FrameInfo` in `shaders_wgsl/bindings/frame.wgsl`.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub struct FrameInfo {
+    /// Reversed-depth projection with no far plane.
+    pub clip_from_relative: Mat4,
+    /// Unit view axis; `w`: near plane, world units.
+    pub forward: Vec4,
+    /// Linear rgb.
+    pub ambient: Vec4,
+    /// Lights in the buffer that count.
+    pub light_count: u32,
+    /// Padding.
+    pub pad_0: u32,
+    /// Padding.
+    pub pad_1: u32,
+    /// Padding.
+    pub pad_2: u32,
+}
+
+/// Twin of `Light` in `shaders_wgsl/bindings/frame.wgsl`.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub struct LightInfo {
+    /// Camera-relative position (`w` = 1) or direction towards the light (`w` = 0).
+    pub place: Vec4,
+    /// Linear rgb.
+    pub color: Vec4,
+}
+
+/// Twin of `DrawInfo` in `shaders_wgsl/bindings/draw.wgsl`.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub struct DrawInfo {
+    /// From the centred mesh to camera-relative world space.
+    pub relative_from_object: Mat4,
+    /// The inverse.
+    pub object_from_relative: Mat4,
+    /// Camera in the space of the centred mesh.
+    pub eye: Vec4,
+}
+
+/// Twin of `MaterialInfo` in `shaders_wgsl/bindings/material.wgsl`.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub struct MaterialInfo {
+    /// Linear rgba.
+    pub albedo_factor: Vec4,
+    /// Texels of the height map across.
+    pub map_width: f32,
+    /// Texels of the height map down.
+    pub map_height: f32,
+    /// Height range, mesh units.
+    pub scale: f32,
+    /// Height that lies on the mesh.
+    pub base: f32,
+    /// Specular share, 0..1.
+    pub specular: f32,
+    /// Blinn-Phong exponent.
+    pub shininess: f32,
+    /// Tiles after which the map repeats, 0 for never.
+    pub period: f32,
+    /// [`wrap_code`].
+    pub wrap: u32,
+}
+
+/// Levels that [`HeightInfo`] has room for; enough for the longest side twice (mirrored).
+pub const MAX_LEVELS: usize = 18;
+
+/// Twin of `HeightInfo` in `shaders_wgsl/lib/height_info.wgsl`.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub struct HeightInfo {
+    /// Texels along u and v.
+    pub size: [f32; 2],
+    /// Height that lies on the mesh.
+    pub base: f32,
+    /// Height range, mesh units.
+    pub scale: f32,
+    /// Mesh units covered by one tile.
+    pub tile_size: [f32; 2],
+    /// [`wrap_code`].
+    pub wrap: u32,
+    /// Levels of the max pyramid.
+    pub level_count: u32,
+    /// Cells along x and y.
+    pub cells: [u32; 2],
+    /// Texel at the lower side of cell 0.
+    pub first_texel: i32,
+    /// Highest corner.
+    pub highest: f32,
+    /// Nodes along x and y, offset, unused.
+    pub levels: [[u32; 4]; MAX_LEVELS],
+}
+
+/// Twin of `MarchSegment` in `shaders_wgsl/kernels/march.wgsl`.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub struct MarchSegment {
+    /// Texture space.
+    pub start: [f32; 3],
+    /// Cosine between ray and normal.
+    pub cos_theta: f32,
+    /// End minus start.
+    pub delta: [f32; 3],
+    /// Padding.
+    pub unused: f32,
+}
+
+/// Twin of `MarchResult` in `shaders_wgsl/kernels/march.wgsl`.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub struct MarchResult {
+    /// Position along the segment.
+    pub tau: f32,
+    /// 0 hit, 1 left, 2 unconverged.
+    pub status: u32,
+    /// Steps taken.
+    pub steps: u32,
+    /// Padding.
+    pub unused: u32,
+}
+
+/// How the shaders name a wrap mode: 0 repeat, 1 clamp, 2 mirror.
+pub fn wrap_code(wrap: heightfield::Wrap) -> u32 {
+    match wrap {
+        heightfield::Wrap::Repeat => 0,
+        heightfield::Wrap::Clamp => 1,
+        heightfield::Wrap::Mirror => 2,
+    }
+}

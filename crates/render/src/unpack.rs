@@ -1,0 +1,139 @@
+//! From rows of the targets to the frame's arrays and counts.
+
+use glam::{DVec3, Vec3};
+
+use crate::targets::{COLOR, NORMAL, PLACE, POSITION, RAY_DELTA, RAY_START, TRACE};
+use crate::{AovSet, Aovs, Frame, RenderError, Request, Stats};
+
+/// Collects rows. The twin of `pack_trace` in `shaders_wgsl/lib/targets.wgsl`.
+pub(crate) struct Unpacker {
+    width: usize,
+    height: usize,
+    eye: DVec3,
+    color: Vec<u8>,
+    trace: Vec<u32>,
+    aovs: Aovs,
+    wanted: AovSet,
+}
+
+const COVERED: u32 = 1 << 31;
+const MARCHED: u32 = 1 << 30;
+
+fn status(trace: u32) -> u32 {
+    (trace >> 28) & 3
+}
+
+fn shadow_rays(trace: u32) -> u32 {
+    (trace >> 20) & 0xff
+}
+
+fn steps(trace: u32) -> u32 {
+    trace & 0xf_ffff
+}
+
+impl Unpacker {
+    pub fn new(request: &Request, eye: DVec3) -> Result<Self, RenderError> {
+        let (width, height) = (request.width as usize, request.height as usize);
+        let pixels = width * height;
+        let wanted = request.aovs;
+        let floats = |aov, channels: usize| -> Result<Option<Vec<f32>>, RenderError> {
+            if !wanted.contains(aov) {
+                return Ok(None);
+            }
+            Ok(Some(zeros(pixels * channels)?))
+        };
+        let aovs = Aovs {
+            uv: floats(AovSet::UV, 2)?,
+            depth: floats(AovSet::DEPTH, 1)?,
+            position: floats(AovSet::POSITION, 3)?,
+            normal: floats(AovSet::NORMAL, 3)?,
+            height: floats(AovSet::HEIGHT, 1)?,
+            shadow: floats(AovSet::SHADOW, 1)?,
+            ray_start: floats(AovSet::RAY_START, 3)?,
+            ray_delta: floats(AovSet::RAY_DELTA, 3)?,
+            steps: None,
+            mask: None,
+        };
+        Ok(Self { width, height, eye, color: zeros(4 * pixels)?, trace: zeros(pixels)?, aovs, wanted })
+    }
+
+    /// Takes one row of a target. The trace of a row comes before its other outputs.
+    pub fn row(&mut self, target: usize, row: u32, bytes: &[u8]) {
+        let from = row as usize * self.width;
+        let pixels = from..from + self.width;
+        match target {
+            COLOR => self.color[4 * from..4 * pixels.end].copy_from_slice(bytes),
+            TRACE => {
+                for (out, word) in self.trace[pixels].iter_mut().zip(bytes.as_chunks::<4>().0) {
+                    *out = u32::from_le_bytes(*word);
+                }
+            }
+            _ => {
+                for (at, texel) in pixels.zip(bytes.as_chunks::<16>().0) {
+                    let texel: [f32; 4] = bytemuck::cast(*texel);
+                    self.texel(target, at, texel);
+                }
+            }
+        }
+    }
+
+    fn texel(&mut self, target: usize, at: usize, texel: [f32; 4]) {
+        let covered = self.trace[at] & COVERED != 0;
+        let [x, y, z, w] = texel;
+        match target {
+            PLACE => {
+                write(&mut self.aovs.uv, at, [x, y]);
+                write(&mut self.aovs.depth, at, [if covered { z } else { f32::INFINITY }]);
+                write(&mut self.aovs.height, at, [w]);
+            }
+            POSITION => {
+                let world = (self.eye + Vec3::new(x, y, z).as_dvec3()).as_vec3();
+                write(&mut self.aovs.position, at, if covered { world.to_array() } else { [0.0; 3] });
+                write(&mut self.aovs.shadow, at, [w]);
+            }
+            NORMAL => write(&mut self.aovs.normal, at, [x, y, z]),
+            RAY_START => write(&mut self.aovs.ray_start, at, [x, y, z]),
+            RAY_DELTA => write(&mut self.aovs.ray_delta, at, [x, y, z]),
+            _ => (),
+        }
+    }
+
+    /// The frame, and the counts of its pixels.
+    pub fn finish(mut self, stats: &mut Stats) -> Frame {
+        for &trace in &self.trace {
+            stats.pixels_covered += u64::from(trace & COVERED != 0);
+            stats.pixels_marched += u64::from(trace & MARCHED != 0);
+            stats.pixels_unconverged += u64::from(status(trace) == 2);
+            stats.steps += u64::from(steps(trace));
+            stats.shadow_rays += u64::from(shadow_rays(trace));
+        }
+        if self.wanted.contains(AovSet::MASK) {
+            self.aovs.mask = Some(self.trace.iter().map(|trace| u8::from(trace & COVERED != 0)).collect());
+        }
+        if self.wanted.contains(AovSet::STEPS) {
+            self.aovs.steps = Some(self.trace.iter().map(|&trace| steps(trace)).collect());
+        }
+        Frame {
+            width: self.width as u32,
+            height: self.height as u32,
+            color: self.color,
+            aovs: self.aovs,
+            stats: Stats::default(),
+            warnings: Vec::new(),
+        }
+    }
+}
+
+fn write<const N: usize>(out: &mut Option<Vec<f32>>, at: usize, values: [f32; N]) {
+    if let Some(out) = out {
+        out[N * at..N * (at + 1)].copy_from_slice(&values);
+    }
+}
+
+/// Zeros, or an error where the machine has no memory for them.
+fn zeros<T: Clone + Default>(length: usize) -> Result<Vec<T>, RenderError> {
+    let mut values = Vec::new();
+    values.try_reserve_exact(length).map_err(|_| RenderError::OutOfMemory("making room for the picture"))?;
+    values.resize(length, T::default());
+    Ok(values)
+}
