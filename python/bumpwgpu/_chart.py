@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["FLOOR_TEXELS", "Label", "Point", "axis_range", "colors", "place_labels", "points"]
+__all__ = ["FLOOR_TEXELS", "Label", "Point", "axis_range", "colors", "place_labels", "points", "short"]
 
 #: Errors below this are drawn here: on a logarithmic axis nothing is exact.
 FLOOR_TEXELS = 1e-4
@@ -63,11 +64,18 @@ def colors(result: Any) -> dict[str, str]:
     return {name: _PALETTE[at % len(_PALETTE)] for at, name in enumerate(names)}
 
 
-def axis_range(values: Sequence[float]) -> tuple[float, float]:
-    """Limits of a logarithmic axis with some room around the values."""
+def axis_range(values: Sequence[float], decades: float) -> tuple[float, float]:
+    """Limits of a logarithmic axis with some room around the values, at least so many decades apart."""
     low, high = min(values), max(values)
     room = max((high / low) ** 0.08, 1.25)
+    lacking = decades - math.log10(high / low * room * room)
+    high *= 10.0 ** max(lacking, 0.0)
     return low / room, high * room
+
+
+def short(label: str) -> str:
+    """``relief(32, 8)`` for ``relief(linear=32, refine=8)``: the axes need the room."""
+    return re.sub(r"\w+=", "", label)
 
 
 @dataclass(frozen=True)
@@ -103,8 +111,8 @@ def place_labels(
                 reach = distance * radius
                 cx = x + math.cos(angle) * (reach + radius + 0.5 * width)
                 cy = y + math.sin(angle) * (reach + radius + 0.5 * height)
-                left = min(max(cx - 0.5 * width, 0.0), bounds[0] - width)
-                low = min(max(cy - 0.5 * height, 0.0), bounds[1] - height)
+                left = min(max(cx - 0.5 * width, radius), bounds[0] - radius - width)
+                low = min(max(cy - 0.5 * height, radius), bounds[1] - radius - height)
                 box = (left, low, left + width, low + height)
                 cost = sum(_overlap(box, other) for other in taken) + 0.02 * distance * radius
                 if best is None or cost < best[0]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ._atomic import replace_file
-from ._chart import FLOOR_TEXELS, axis_range, colors, place_labels, points
+from ._chart import FLOOR_TEXELS, axis_range, colors, place_labels, points, short
 from .errors import CompareError
 
 if TYPE_CHECKING:
@@ -69,8 +69,8 @@ def _draw_panel(axes: Any, result: CompareResult, elevation: Any, palette: dict[
     shown = points(result, elevation)
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.set_xlim(*axis_range([end for p in shown for end in (p.low_ns, p.high_ns)]))
-    axes.set_ylim(*axis_range([p.error_texels for p in shown]))
+    axes.set_xlim(*axis_range([end for p in shown for end in (p.low_ns, p.high_ns)], 0.5))
+    axes.set_ylim(*axis_range([p.error_texels for p in shown], 2.0))
     axes.grid(True, which="major", color="#dddddd", linewidth=0.6)
     axes.set_axisbelow(True)
     front = sorted((p for p in shown if p.on_front), key=lambda p: p.time_ns)
@@ -94,6 +94,10 @@ def _draw_panel(axes: Any, result: CompareResult, elevation: Any, palette: dict[
     axes.tick_params(labelsize=8, which="both")
     if any(p.error_texels == FLOOR_TEXELS for p in shown):
         axes.axhline(FLOOR_TEXELS, color="#999999", linewidth=0.6, linestyle=":")
+        axes.text(
+            0.99, FLOOR_TEXELS, f"{FLOOR_TEXELS:g} and below ", transform=axes.get_yaxis_transform(),
+            fontsize=6.5, color="#888888", ha="right", va="top",
+        )  # fmt: skip
 
 
 def _draw_labels(figure: Any, axes: Any, result: CompareResult, elevation: Any) -> None:
@@ -107,7 +111,7 @@ def _draw_labels(figure: Any, axes: Any, result: CompareResult, elevation: Any) 
     named = sorted((p for p in shown if p.on_front or p.on_loose_front), key=lambda p: not p.on_front)
     texts = [
         axes.text(
-            0, 0, p.label, fontsize=_FONT_POINTS, color="#000000" if p.on_front else "#666666",
+            0, 0, short(p.label), fontsize=_FONT_POINTS, color="#000000" if p.on_front else "#666666",
             weight="bold" if p.on_front else "normal",
         )
         for p in named
