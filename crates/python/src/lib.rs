@@ -1,0 +1,49 @@
+//! `bumpwgpu._bumpwgpu`: what the Python package gets from the Rust crates.
+//!
+//! Nothing is decided here. Arguments arrive checked and normalised by `python/bumpwgpu`; heavy
+//! work leaves through [`run::run`] and errors through [`errors::Raise`].
+
+mod baking;
+mod compare;
+mod errors;
+mod field;
+mod images;
+mod march;
+mod mesh;
+mod run;
+mod system;
+
+use pyo3::prelude::*;
+
+/// The compiled half of bumpwgpu; use the package `bumpwgpu` instead.
+#[pymodule]
+mod _bumpwgpu {
+    #[pymodule_export]
+    use crate::baking::{bake_map, bake_names, save_map};
+    #[pymodule_export]
+    use crate::compare::{CompareView, SegmentReference, compare_front, compare_planar, compare_recommend};
+    #[pymodule_export]
+    use crate::errors::classes::{BakeError, BumpError, CompareError, MeshError, RenderError};
+    #[pymodule_export]
+    use crate::field::Field;
+    #[pymodule_export]
+    use crate::images::{decode_image, effective_bits, read_image, write_image};
+    #[pymodule_export]
+    use crate::march::{march, techniques};
+    #[pymodule_export]
+    use crate::mesh::{PyMesh, tangent_methods};
+    #[pymodule_export]
+    use crate::system::{adapters, simd_level, threads};
+
+    /// Version of the package.
+    #[pymodule_export]
+    const VERSION: &str = env!("CARGO_PKG_VERSION");
+    /// Longest side of a height map, in texels.
+    #[pymodule_export]
+    const MAX_SIDE: usize = heightfield::field::MAX_SIDE;
+
+    #[pymodule_init]
+    fn init() {
+        crate::run::install_panic_hook();
+    }
+}

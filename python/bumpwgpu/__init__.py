@@ -1,0 +1,51 @@
+"""Surface detail from height maps: bake, march, render, compare.
+
+>>> import bumpwgpu as bw
+>>> bricks = bw.HeightMap.procedural("bricks", size=64)
+>>> bw.bake(bricks)["normal"].shape
+(64, 64, 3)
+"""
+
+from __future__ import annotations
+
+from . import techniques
+from ._bumpwgpu import VERSION as __version__
+from .baking import Maps, bake
+from .compare import CompareResult, Recommendation, Scene, compare
+from .errors import BakeError, BumpError, BumpWarning, CompareError, MeshError, RenderError
+from .heightmap import HeightMap
+from .marching import Hits, march
+from .meshes import Mesh, MeshMaterial, Part, Tangents
+from .rendering import Frame, render
+from .scene import Camera, Light, Material
+from .system import info
+
+__all__ = [
+    "BakeError",
+    "BumpError",
+    "BumpWarning",
+    "Camera",
+    "CompareError",
+    "CompareResult",
+    "Frame",
+    "HeightMap",
+    "Hits",
+    "Light",
+    "Maps",
+    "Material",
+    "Mesh",
+    "MeshError",
+    "MeshMaterial",
+    "Part",
+    "Recommendation",
+    "RenderError",
+    "Scene",
+    "Tangents",
+    "__version__",
+    "bake",
+    "compare",
+    "info",
+    "march",
+    "render",
+    "techniques",
+]

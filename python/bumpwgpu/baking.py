@@ -1,0 +1,246 @@
+"""Baking maps from height maps, and saving them."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from io import BytesIO
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _bumpwgpu
+from ._atomic import replace_file
+from ._checks import choice
+from .errors import BakeError, BumpWarning
+from .heightmap import HeightMap, HeightSource
+from .meshes import Mesh
+
+__all__ = ["CONVENTIONS", "KERNELS", "MAPS", "Maps", "Progress", "bake"]
+
+Progress: TypeAlias = Callable[[int, int], object]
+Kernel: TypeAlias = Literal["forward", "central", "sobel3", "sobel5", "scharr", "prewitt", "bilinear"]
+Convention: TypeAlias = Literal["opengl", "directx"]
+
+_maps, _kernels = _bumpwgpu.bake_names()
+#: Maps that can be baked.
+MAPS: tuple[str, ...] = tuple(name for name, _ in _maps)
+#: Slope kernels.
+KERNELS: tuple[str, ...] = tuple(_kernels)
+#: Which way green points.
+CONVENTIONS = ("opengl", "directx")
+
+
+class Maps(Mapping[str, Any]):
+    """Baked maps by name.
+
+    ``maps["normal"]``, ``["normal_xy"]`` and ``["relief"]`` are float32 arrays of shape (H, W, 3),
+    (H, W, 2) and (H, W, 4): unit normals in -1..1 (+X right, +Y up unless baked otherwise, +Z out),
+    and height in 0..1. ``maps["pyramid"]`` is a tuple of (h, w, 2) arrays, finest first: the lowest
+    and the highest point of ever larger blocks of the bilinear surface.
+    """
+
+    __slots__ = ("_layers",)
+
+    def __init__(self, layers: dict[str, tuple[NDArray[np.float32], ...]]) -> None:
+        self._layers = layers
+
+    def __getitem__(self, name: str) -> Any:
+        layers = self._layers[name]
+        return layers if name == "pyramid" else layers[0]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._layers)
+
+    def __len__(self) -> int:
+        return len(self._layers)
+
+    def __repr__(self) -> str:
+        return f"<Maps: {', '.join(f'{name} {layers[0].shape}' for name, layers in self._layers.items())}>"
+
+    def save(
+        self,
+        folder: str | os.PathLike[str],
+        *,
+        format: Literal["png", "exr", "npy"] = "png",
+        bits: Literal[8, 16] | None = None,
+        prefix: str = "",
+    ) -> list[Path]:
+        """Write every map into a folder, which is made if need be.
+
+        Each file gets a temporary name first, so an interrupted run leaves no half of one.
+
+        Parameters
+        ----------
+        folder : path
+            Where to.
+        format : {"png", "exr", "npy"}
+            PNG holds ``(n + 1) / 2`` for normals, heights as they are, and 0 in the blue channel of
+            two-channel maps; of a pyramid, minima are rounded down and maxima up. EXR and npy hold
+            the floats.
+        bits : 8, 16 or None
+            Of a PNG; None is 8. A flat normal is (128, 128, 255) in 8 bits.
+        prefix : str, default ""
+            Files are ``<prefix>_<map>.png``, levels of a pyramid ``<prefix>_pyramid_00.png``.
+
+        Returns
+        -------
+        list of Path
+            The files made.
+
+        Raises
+        ------
+        BakeError, OSError
+            A file cannot be written.
+        ValueError, TypeError
+            An unknown format, or a prefix that is no file name.
+
+        Warns
+        -----
+        BumpWarning
+            `bits` together with a format of floats.
+
+        Examples
+        --------
+        >>> import bumpwgpu as bw, tempfile
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     [path.name for path in bw.bake(bw.HeightMap([[0.0, 1.0]])).save(folder, bits=16)]
+        ['normal.png']
+        """
+        choice("format", format, ("png", "exr", "npy"))
+        if bits is not None and (isinstance(bits, bool) or bits not in (8, 16)):
+            raise ValueError(f"bits must be 8 or 16, got {bits!r}")
+        if bits is not None and format != "png":
+            _warn(f"bits={bits} has no effect: {format} files hold floats")
+        if not isinstance(prefix, str):
+            raise TypeError(f"prefix must be a string, got {type(prefix).__name__}")
+        if "/" in prefix or "\\" in prefix or "\0" in prefix:
+            raise ValueError(f"prefix must be part of a file name, got {prefix!r}")
+        target = _folder(folder)
+        made: list[Path] = []
+        for name, layers in self._layers.items():
+            if format == "npy":
+                made += _save_npy(name, layers, target, prefix)
+            else:
+                arrays = [np.require(layer, np.float32, ("C", "A")) for layer in layers]
+                made += _bumpwgpu.save_map(name, arrays, target, prefix, format, bits or 8)
+        return made
+
+
+def _warn(text: str) -> None:
+    warnings.warn(text, BumpWarning, stacklevel=3)
+
+
+def _folder(folder: Any) -> Path:
+    if not isinstance(folder, str | os.PathLike):
+        raise TypeError(f"folder must be a string or a path, got {type(folder).__name__}")
+    target = Path(folder)
+    if "\0" in str(target):
+        raise ValueError("folder contains a null character")
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise BakeError(f"cannot write into {target}: it is a file, not a folder") from None
+    return target
+
+
+def _save_npy(name: str, layers: tuple[NDArray[np.float32], ...], folder: Path, prefix: str) -> list[Path]:
+    stem = f"{prefix}_{name}" if prefix else name
+    made = []
+    for level, layer in enumerate(layers):
+        path = folder / (f"{stem}_{level:02}.npy" if name == "pyramid" else f"{stem}.npy")
+        data = BytesIO()
+        np.save(data, layer, allow_pickle=False)
+        made.append(replace_file(path, data.getvalue()))
+    return made
+
+
+def bake(
+    source: HeightMap | HeightSource | Mesh,
+    maps: str | Iterable[str] = ("normal",),
+    *,
+    kernel: Kernel = "sobel3",
+    convention: Convention = "opengl",
+    progress: Progress | None = None,
+    **options: Any,
+) -> Maps:
+    """Make the maps a renderer needs from a height map.
+
+    Parameters
+    ----------
+    source : HeightMap, path, array or PIL image
+        The heights.
+    maps : str or iterable of str, default ("normal",)
+        Any of :data:`MAPS`: "normal", "normal_xy", "relief", "pyramid".
+    kernel : {"forward", "central", "sobel3", "sobel5", "scharr", "prewitt", "bilinear"}
+        How slopes are taken from texels; "bilinear" is the mean gradient over a texel of the very
+        surface that the searches march.
+    convention : {"opengl", "directx"}
+        Whether green points up or down the image.
+    progress : callable or None
+        Called as ``progress(done, total)``, in rows, on the calling thread; an exception from it
+        stops the bake.
+    **options
+        For sources that are no HeightMap yet: what :class:`HeightMap` takes, such as ``scale``.
+
+    Returns
+    -------
+    Maps
+
+    Raises
+    ------
+    ValueError, TypeError
+        An unknown map, kernel or convention, or what :class:`HeightMap` raises.
+    FileNotFoundError, BakeError
+        The source file is missing or damaged.
+
+    Notes
+    -----
+    The normal of a texel is ``normalize(-dh/dx, dh/dy, 1)`` (y down) with slopes per mesh unit:
+    ``scale * dh/dtexel * W / tile_size`` (Blinn 1978; Cohen, Olano, Manocha 1998).
+
+    Examples
+    --------
+    >>> import bumpwgpu as bw
+    >>> maps = bw.bake(bw.HeightMap.procedural("flat", 8), maps=("normal", "pyramid"))
+    >>> maps["normal"][0, 0].tolist(), len(maps["pyramid"])
+    ([0.0, 0.0, 1.0], 4)
+    """
+    names = _map_names(maps)
+    choice("kernel", "sobel3" if kernel == "sobel" else kernel, KERNELS)
+    choice("convention", convention, CONVENTIONS)
+    if progress is not None and not callable(progress):
+        raise TypeError(f"progress must be callable, got {type(progress).__name__}")
+    if isinstance(source, Mesh):
+        raise TypeError("bake takes height maps; mesh.tangents() gives a mesh's tangent frames")
+    if isinstance(source, HeightMap):
+        if options:
+            raise TypeError(f"bake() got unexpected options {', '.join(options)}; source is a HeightMap already")
+        heights = source
+    else:
+        heights = HeightMap(source, **options)
+    rows = heights.shape[0]
+    layers = {}
+    for at, name in enumerate(names):
+        made = _bumpwgpu.bake_map(
+            heights._field, name, kernel, convention, progress, at * rows, len(names) * rows
+        )
+        layers[name] = tuple(made)
+    return Maps(layers)
+
+
+def _map_names(maps: Any) -> list[str]:
+    if isinstance(maps, str):
+        maps = (maps,)
+    try:
+        names = list(maps)
+    except TypeError:
+        raise TypeError(f"maps must be names, got {type(maps).__name__}") from None
+    for name in names:
+        choice("map", name, MAPS)
+    if not names:
+        raise ValueError(f"maps is empty; ask for at least one of {', '.join(MAPS)}")
+    return list(dict.fromkeys(names))

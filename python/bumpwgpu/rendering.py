@@ -1,0 +1,336 @@
+"""Rendering meshes with relief, headless, on a Vulkan device."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Iterable, Sequence
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _bumpwgpu
+from ._atomic import replace_file
+from ._checks import choice, flag, numbers, strings, whole
+from .errors import BumpWarning, RenderError
+from .meshes import Mesh
+from .scene import Camera, Light, Material
+from .techniques import Technique, get
+
+if TYPE_CHECKING:
+    from PIL import Image
+
+__all__ = ["AOVS", "Frame", "render"]
+
+#: Additional outputs.
+AOVS: tuple[str, ...] = (
+    "uv",
+    "depth",
+    "position",
+    "normal",
+    "height",
+    "steps",
+    "shadow",
+    "mask",
+    "ray_start",
+    "ray_delta",
+)
+#: Longest side of a picture, in pixels.
+MAX_SIDE = 1 << 16
+
+_DEFAULT_LIGHTS = (Light.directional((-0.6, -0.7, -0.9)),)
+
+
+class Frame:
+    """A picture and what came with it.
+
+    Attributes
+    ----------
+    color : ndarray of uint8, (H, W, 4)
+        sRGB with alpha, row 0 on top.
+    aovs : dict of str to ndarray of float32
+        The additional outputs that were asked for; see :func:`render`.
+    stats : dict
+        Times in milliseconds (``prepare_ms``, ``compile_ms``, ``draw_ms``, ``readback_ms``,
+        ``total_ms``), ``triangles_drawn``, ``triangles_culled``, ``pixels_covered``,
+        ``pixels_marched``, ``pixels_skipped``, ``pixels_unconverged``, ``steps``, ``shadow_rays``,
+        ``maps_baked``, and whether ``draw_ms`` is from the device's own clock.
+    warnings : tuple of str
+        Settings that could not take effect; also given as Python warnings.
+    """
+
+    __slots__ = ("_aovs", "_color", "_stats", "_warnings")
+
+    def __init__(
+        self,
+        color: NDArray[np.uint8],
+        aovs: dict[str, NDArray[np.float32]],
+        stats: dict[str, Any],
+        warnings: tuple[str, ...] = (),
+    ) -> None:
+        self._color = color
+        self._aovs = aovs
+        self._stats = stats
+        self._warnings = warnings
+
+    @property
+    def color(self) -> NDArray[np.uint8]:
+        """sRGB with alpha, uint8 (H, W, 4), row 0 on top."""
+        return self._color
+
+    @property
+    def aovs(self) -> dict[str, NDArray[np.float32]]:
+        """Additional outputs by name, float32."""
+        return self._aovs
+
+    @property
+    def stats(self) -> dict[str, Any]:
+        """Times in milliseconds and counts."""
+        return self._stats
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Settings that could not take effect."""
+        return self._warnings
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the picture; the suffix decides the format (PNG, TIFF, or what Pillow writes).
+
+        Parameters
+        ----------
+        path : path
+            Where to. Its folder must exist. The file appears only when it is complete.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        ValueError
+            A suffix that no writer knows.
+        OSError
+            The file cannot be written.
+        TypeError
+            `path` is no path.
+        """
+        if not isinstance(path, str | os.PathLike):
+            raise TypeError(f"path must be a string or a path, got {type(path).__name__}")
+        target = Path(path)
+        from PIL import Image
+
+        Image.init()
+        kind = Image.EXTENSION.get(target.suffix.lower())
+        if kind is None or kind not in Image.SAVE:
+            raise ValueError(f"cannot write {target.name!r}: unknown image suffix {target.suffix!r}; use .png")
+        image = self.to_pil()
+        if kind in ("JPEG", "BMP", "PPM"):
+            image = image.convert("RGB")
+        data = BytesIO()
+        image.save(data, format=kind)
+        return replace_file(target, data.getvalue())
+
+    def to_pil(self) -> Image.Image:
+        """The picture as a PIL image, mode RGBA.
+
+        Returns
+        -------
+        PIL.Image.Image
+        """
+        from PIL import Image
+
+        return Image.fromarray(self._color)
+
+    def _repr_png_(self) -> bytes:
+        buffer = BytesIO()
+        self.to_pil().save(buffer, format="PNG")
+        return buffer.getvalue()
+
+    def __repr__(self) -> str:
+        height, width = self._color.shape[:2]
+        outputs = f", aovs: {', '.join(self._aovs)}" if self._aovs else ""
+        return f"<Frame {width} x {height}{outputs}>"
+
+
+def render(
+    mesh: Mesh,
+    material: Material | Sequence[Material] | None = None,
+    *,
+    camera: Camera | None = None,
+    lights: Iterable[Light] | None = None,
+    technique: str | Technique = "relief",
+    size: int | tuple[int, int] = (512, 512),
+    shadows: bool | None = None,
+    aovs: str | Iterable[str] = (),
+    device: str = "auto",
+    ambient: float | tuple[float, float, float] = 0.1,
+    background: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0),
+) -> Frame:
+    """Draw a mesh with a relief.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        What to draw.
+    material : Material, sequence of Material or None
+        One for the whole mesh, or one for each of ``mesh.materials``, or None for the mesh file's own.
+    camera : Camera or None
+        None looks at the whole mesh from the front, a little from above.
+    lights : iterable of Light or None
+        None is one directional light from the upper right.
+    technique : str or Technique, default "relief"
+        One of :func:`bumpwgpu.techniques.names`.
+    size : int or (int, int), default (512, 512)
+        Pixels: the side of a square, or (width, height).
+    shadows : bool or None
+        Whether the relief shadows itself. None: where the technique can.
+    aovs : str or iterable of str
+        Additional outputs, (H, W) or (H, W, C): "uv" (unwrapped), "depth" (along the view axis, mesh
+        units, inf where nothing is), "position", "normal" (world axes), "height" (0..1), "steps",
+        "shadow" (share of the lights that the relief hides), "mask" (1 where there is anything),
+        "ray_start" and "ray_delta" (the segment searched, texture space).
+    device : {"auto", "gpu"}
+        Both render on the Vulkan device; the environment variable ``BUMPWGPU_ADAPTER`` picks one by
+        a part of its name.
+    ambient : float or (float, float, float), default 0.1
+        Light from everywhere, linear RGB.
+    background : tuple of 3 or 4 floats, default transparent black
+        Colour where nothing is, linear RGB and alpha, 0..1.
+
+    Returns
+    -------
+    Frame
+
+    Raises
+    ------
+    RenderError
+        No Vulkan device answers (the message says what to install), or the picture is too large for it.
+    BakeError
+        An image of the mesh's own materials is damaged.
+    ValueError, TypeError
+        A value out of range, or of the wrong kind.
+
+    Warns
+    -----
+    BumpWarning
+        A setting that cannot take effect, such as shadows with a technique that casts none.
+
+    Examples
+    --------
+    >>> import bumpwgpu as bw
+    >>> wall = bw.Material(height=bw.HeightMap.procedural("bricks", 64))
+    >>> bw.render(bw.Mesh.quad(), wall, size=(32, 16)).color.shape  # doctest: +GPU
+    (16, 32, 4)
+    """
+    if not isinstance(mesh, Mesh):
+        raise TypeError(f"mesh must be a Mesh, got {type(mesh).__name__}")
+    chosen = get(technique)
+    choice("device", device, ("auto", "gpu", "cpu"))
+    if device == "cpu":
+        raise ValueError("render needs a Vulkan device: device='auto' or 'gpu'; Mesa's lavapipe is one in software")
+    outputs = strings("aovs", aovs, AOVS)
+    width, height = _size(size)
+    if camera is None:
+        camera = _front(mesh, width / height)
+    elif not isinstance(camera, Camera):
+        raise TypeError(f"camera must be a Camera, got {type(camera).__name__}")
+    draws = _draws(mesh, material)
+    result = _bumpwgpu.render(
+        [(mesh._core, first, end, used._core) for first, end, used in draws],
+        (camera.eye, camera.target, camera.up, camera.fov_y),
+        [(light.kind == "directional", light.vector, light.color, light.intensity) for light in _lights(lights)],
+        _ambient(ambient),
+        _background(background),
+        chosen.name,
+        list(chosen.parameters.items()),
+        (width, height),
+        None if shadows is None else flag("shadows", shadows),
+        outputs,
+    )
+    texts = list(result["warnings"])
+    if chosen.name != "flat" and not any(used.height is not None or used.normal is not None for *_, used in draws):
+        texts.append(f"technique {chosen.name!r} has no effect: the material has no height map")
+    for text in texts:
+        warnings.warn(text, BumpWarning, stacklevel=2)
+    return Frame(result["color"], result["aovs"], result["stats"], tuple(texts))
+
+
+def _size(size: Any) -> tuple[int, int]:
+    if isinstance(size, tuple | list):
+        if len(size) != 2:
+            raise ValueError(f"size must be one number or (width, height), got {len(size)} numbers")
+        width, height = whole("size[0]", size[0]), whole("size[1]", size[1])
+    else:
+        width = height = whole("size", size)
+    if width < 1 or height < 1:
+        raise ValueError(f"size is {width} x {height}; each side must be at least 1")
+    if width > MAX_SIDE or height > MAX_SIDE:
+        raise RenderError(f"size is {width} x {height}; each side may be at most {MAX_SIDE}")
+    return width, height
+
+
+def _draws(mesh: Mesh, material: Any) -> list[tuple[int, int, Material]]:
+    """Runs of triangles with their material."""
+    triangles = len(mesh.indices)
+    if isinstance(material, Material):
+        return [(0, triangles, material)]
+    if material is None:
+        loaded = mesh.load_materials()
+    elif isinstance(material, Sequence) and all(isinstance(part, Material) for part in material):
+        loaded = list(material)
+        if len(loaded) != len(mesh.materials):
+            raise ValueError(f"{len(loaded)} materials given, but the mesh has {len(mesh.materials)}")
+    else:
+        raise TypeError(f"material must be a Material, a sequence of them or None, got {type(material).__name__}")
+    plain = Material()
+    return [
+        (part.triangles.start, part.triangles.stop, plain if part.material is None else loaded[part.material])
+        for part in mesh.parts
+    ]
+
+
+def _front(mesh: Mesh, aspect: float) -> Camera:
+    """A camera that sees the whole mesh from the front, a little from above."""
+    low, high = (np.array(corner, np.float64) for corner in mesh.bounds)
+    centre = (low + high) / 2.0
+    radius = max(float(np.linalg.norm(high - low)) / 2.0, 1e-6)
+    fov_y = 40.0
+    half = np.radians(fov_y / 2.0)
+    narrow = min(half, np.arctan(np.tan(half) * aspect))
+    way = np.array([0.35, 0.45, 1.0])
+    eye = centre + way / np.linalg.norm(way) * (radius / np.sin(narrow) * 1.02)
+    return Camera.look_at(eye, centre, fov_y=fov_y)
+
+
+def _lights(lights: Any) -> list[Light]:
+    if lights is None:
+        return list(_DEFAULT_LIGHTS)
+    if isinstance(lights, Light):
+        return [lights]
+    try:
+        listed = list(lights)
+    except TypeError:
+        raise TypeError(f"lights must be a list of Light, got {type(lights).__name__}") from None
+    for at, light in enumerate(listed):
+        if not isinstance(light, Light):
+            raise TypeError(f"lights[{at}] must be a Light, got {type(light).__name__}")
+    return listed
+
+
+def _ambient(ambient: Any) -> tuple[float, float, float]:
+    if not hasattr(ambient, "__len__"):
+        ambient = (ambient,) * 3
+    red, green, blue = numbers("ambient", ambient, 3, 0.0)
+    return (red, green, blue)
+
+
+def _background(background: Any) -> tuple[float, float, float, float]:
+    count = 3 if hasattr(background, "__len__") and len(background) == 3 else 4
+    parts = numbers("background", background, count, 0.0)
+    if max(parts) > 1.0:
+        raise ValueError(f"background must be in 0..1, got {background!r}")
+    return (parts[0], parts[1], parts[2], parts[3] if count == 4 else 1.0)
