@@ -40,10 +40,13 @@ fn first_below(start: vec3f, delta: vec3f, layers: i32) -> Bracket {
     return Bracket(false, above, 1.0, gap_above, gap_above, u32(layers));
 }
 
-// Whether any sample of a segment that leaves the surface lies strictly below it.
+// Whether any sample of a segment that leaves the surface lies strictly below it. A start below the
+// surface is lifted onto it: searches that stop at a layer return hits up to a layer too deep, and from
+// there a surface would shadow itself.
 fn any_below(start: vec3f, delta: vec3f, layers: i32) -> bool {
+    let lift = vec3f(0.0, 0.0, max(height_at(start.xy) - start.z, 0.0));
     for (var i = 1; i <= layers; i++) {
-        if gap_at(start, delta, f32(i) / f32(layers)) < 0.0 {
+        if gap_at(start + lift, delta - lift, f32(i) / f32(layers)) < 0.0 {
             return true;
         }
     }

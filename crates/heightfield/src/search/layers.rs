@@ -52,8 +52,13 @@ pub fn first_below(field: &HeightField, start: Vec3, delta: Vec3, layers: u32) -
 }
 
 /// Whether any sample of a segment that leaves the surface lies strictly below it.
+///
+/// A start below the surface is lifted onto it: searches that stop at a layer return hits up to a layer
+/// too deep, and from there a surface would shadow itself.
 #[inline]
 pub fn any_below(field: &HeightField, start: Vec3, delta: Vec3, layers: u32) -> bool {
+    let lift = Vec3::Z * (field.sample(start.x, start.y) - start.z).max(0.0);
+    let (start, delta) = (start + lift, delta - lift);
     (1..=layers).any(|i| gap_at(field, start, delta, i as f32 / layers as f32) < 0.0)
 }
 
