@@ -7,7 +7,7 @@
 
 use std::io::Cursor;
 
-use ::tiff::decoder::{BufferLayoutPreference, Decoder, DecodingResult, Limits};
+use ::tiff::decoder::{BufferLayoutPreference, ChunkType, Decoder, DecodingResult, Limits};
 use ::tiff::tags::Tag;
 use ::tiff::{ColorType, TiffError};
 use half::f16;
@@ -32,14 +32,13 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Image, BakeError> {
         file_bytes: bytes.len(),
     };
     let samples = claim.samples()?;
-    check_strip_offsets(&mut decoder, bytes.len())?;
+    check_chunks(&mut decoder, claim)?;
     let mut limits = Limits::default();
     limits.decoding_buffer_size = samples * usize::from(bits).div_ceil(8);
     limits.intermediate_buffer_size = limits.intermediate_buffer_size.max(bytes.len());
-    let mut decoder = decoder.with_limits(limits);
-    let mut result = DecodingResult::U8(Vec::new());
-    let found = decoder.read_image_to_buffer(&mut result).map_err(explain)?;
+    let mut decoder = decoder.with_limits(limits.clone());
     let shape = Shape { width: width as usize, height: height as usize, channels, bits };
+    let (result, found) = read(&mut decoder, &shape, &limits).map_err(explain)?;
     let mut warnings = Vec::new();
     let samples = convert(result, &shape, &found, &mut warnings)?;
     let mut image = Image::new(shape.width, shape.height, channels, samples)?;
@@ -74,13 +73,67 @@ fn layout(color: ColorType) -> Result<(usize, u8), BakeError> {
     }
 }
 
-/// Strips and tiles that lie outside the file would only be found after the buffer is made.
-fn check_strip_offsets(decoder: &mut Decoder<Cursor<&[u8]>>, file_bytes: usize) -> Result<(), BakeError> {
+/// What would only be found after memory is taken for it: chunks outside the file, or absurd tiles.
+fn check_chunks(decoder: &mut Decoder<Cursor<&[u8]>>, claim: Claim) -> Result<(), BakeError> {
     for tag in [Tag::StripOffsets, Tag::TileOffsets] {
         let offsets = decoder.find_tag_unsigned_vec::<u64>(tag).map_err(explain)?.unwrap_or_default();
-        if let Some(offset) = offsets.into_iter().find(|&offset| offset >= file_bytes as u64) {
-            let problem = format!("it has pixels at byte {offset} but ends at {file_bytes}");
+        if let Some(offset) = offsets.into_iter().find(|&offset| offset >= claim.file_bytes as u64) {
+            let problem = format!("it has pixels at byte {offset} but ends at {}", claim.file_bytes);
             return Err(BakeError::Malformed { format: FORMAT, problem });
+        }
+    }
+    if decoder.get_chunk_type() == ChunkType::Tile {
+        let (width, height) = decoder.chunk_dimensions();
+        let channels = decoder.find_tag_unsigned::<u64>(Tag::SamplesPerPixel).map_err(explain)?.unwrap_or(1);
+        Claim { width: width.into(), height: height.into(), channels, ..claim }.samples()?;
+    }
+    Ok(())
+}
+
+/// Reads the whole picture; planes come one after the other.
+fn read(
+    decoder: &mut Decoder<Cursor<&[u8]>>,
+    shape: &Shape,
+    limits: &Limits,
+) -> Result<(DecodingResult, BufferLayoutPreference), TiffError> {
+    let mut result = DecodingResult::U8(Vec::new());
+    let layout = decoder.image_buffer_layout()?;
+    if layout.planes > 1 && decoder.get_chunk_type() == ChunkType::Tile && shape.bits >= 8 {
+        result.resize_to(&layout, limits)?;
+        read_tiled_planes(decoder, shape, result.as_buffer(0).as_bytes_mut())?;
+        return Ok((result, layout));
+    }
+    let layout = decoder.read_image_to_buffer(&mut result)?;
+    Ok((result, layout))
+}
+
+/// Puts planes of tiles together. The `tiff` crate can do that itself, but it takes the lowest tiles
+/// of all planes but the first for whole ones and then panics.
+fn read_tiled_planes(
+    decoder: &mut Decoder<Cursor<&[u8]>>,
+    shape: &Shape,
+    target: &mut [u8],
+) -> Result<(), TiffError> {
+    let (tile_width, tile_height) = decoder.chunk_dimensions();
+    let (tile_width, tile_height) = (tile_width as usize, tile_height as usize);
+    let sample = usize::from(shape.bits) / 8;
+    let row = shape.width * sample;
+    let mut tile = Vec::new();
+    let mut chunk = 0;
+    for plane in target.chunks_exact_mut(row * shape.height) {
+        for y in (0..shape.height).step_by(tile_height) {
+            for x in (0..shape.width).step_by(tile_width) {
+                let layout = decoder.image_chunk_buffer_layout(chunk)?;
+                tile.resize(layout.len, 0);
+                decoder.read_chunk_bytes(chunk, &mut tile)?;
+                chunk += 1;
+                let stride = layout.row_stride.map_or(layout.len, |stride| stride.get());
+                let wanted = tile_width.min(shape.width - x) * sample;
+                let rows = plane.chunks_exact_mut(row).skip(y).take(tile_height);
+                for (target, source) in rows.zip(tile.chunks_exact(stride)) {
+                    target[x * sample..][..wanted].copy_from_slice(&source[..wanted]);
+                }
+            }
         }
     }
     Ok(())

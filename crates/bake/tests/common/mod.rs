@@ -1,6 +1,8 @@
 //! Helpers of the integration tests.
 #![allow(dead_code, missing_docs)] // each test binary uses some of them
 
+pub mod tiff;
+
 use std::path::{Path, PathBuf};
 
 use bake::{Image, read_image};
