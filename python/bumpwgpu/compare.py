@@ -46,7 +46,7 @@ class Scene:
     camera : Camera
         Where it is seen from.
     lights : sequence of Light
-        At least one light is needed to see relief at all.
+        None at all is one directional light from the upper right.
     size : (int, int), default (512, 512)
         Columns and rows of the picture.
     shadows : bool, default True
@@ -494,7 +494,7 @@ def compare(
         row["label"] = label(row["technique"], row["parameters"])
         row["elevation"] = "all" if row["elevation"] is None else row["elevation"]
     environment = {
-        **_machine(),
+        **machine(),
         "map": repr(source),
         "rays_per_elevation": count,
         "repeats": rounds,
@@ -515,8 +515,8 @@ def _elevations(elevations: Any) -> list[float]:
     for angle in angles:
         if not 0.0 < angle <= 90.0:
             raise ValueError(f"elevations must be above 0 and at most 90 degrees, got {angle:g}")
-    if not angles:
-        raise ValueError("elevations is empty; at least one angle is needed")
+    if not 1 <= len(angles) <= 64:
+        raise ValueError(f"elevations must be 1 to 64 angles, got {len(angles)}")
     return list(dict.fromkeys(angles))
 
 
@@ -535,7 +535,7 @@ def _chosen(techniques: Any) -> list[Technique]:
     return list(dict.fromkeys(_techniques.get(part) for part in parts))
 
 
-def _machine() -> dict[str, Any]:
+def machine() -> dict[str, Any]:
     """Versions and device, for every comparison to state."""
     from . import info
 

@@ -6,7 +6,7 @@ use compare::pareto::{Candidate, front};
 use compare::picture::View;
 use compare::recommend::{Budget, Entry, recommend};
 use compare::{Metrics, Plan, RayErrors, Rays, Reference, Reported, Row, Timing, sweep};
-use heightfield::HeightField;
+use heightfield::{HeightField, Hits, Technique};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -31,22 +31,19 @@ impl Raise for compare::CompareError {
 type Setting = (String, Vec<(String, f64)>);
 
 /// The device as the comparison sees it.
-struct DeviceRunner;
+struct DeviceRunner(Arc<render::Device>);
 
 impl DeviceRunner {
     fn new() -> Result<Self, String> {
-        Err("not built".to_owned())
+        render::device().map(Self).map_err(|error| error.to_string())
     }
 }
 
 impl compare::DeviceMarch for DeviceRunner {
-    fn march(
-        &self,
-        _field: &HeightField,
-        _technique: &heightfield::Technique,
-        _rays: &Rays,
-    ) -> Result<(heightfield::Hits, f64), String> {
-        Err("not built".to_owned())
+    fn march(&self, field: &HeightField, technique: &Technique, rays: &Rays) -> Result<(Hits, f64), String> {
+        render::march(&self.0, field, technique, &rays.origins, &rays.directions)
+            .map(|found| (found.hits, found.device_seconds))
+            .map_err(|error| error.to_string())
     }
 }
 
@@ -238,11 +235,13 @@ impl SegmentReference {
         py: Python<'py>,
         uv: PyReadonlyArray2<'py, f32>,
         z: PyReadonlyArray1<'py, f32>,
+        status: PyReadonlyArray1<'py, u8>,
         group: PyReadonlyArray1<'py, u8>,
         groups: u8,
     ) -> PyResult<(Bound<'py, PyDict>, Vec<Bound<'py, PyDict>>, Bound<'py, PyArray1<f32>>)> {
         let (uv, z) = (uv.as_slice()?, z.as_slice()?);
-        let reported = Reported { uv, z, t: None, normal: None, status: None, steps: None };
+        let reported =
+            Reported { uv, z, t: None, normal: None, status: Some(status.as_slice()?), steps: None };
         let errors =
             run(py, None, |_| RayErrors::measure(&self.field, &self.rays, &self.reference, &reported))?;
         let truly: Vec<usize> = (0..self.rays.len()).filter(|&i| self.reference.truths[i].hit).collect();
