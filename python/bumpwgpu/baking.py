@@ -210,7 +210,7 @@ def bake(
     ([0.0, 0.0, 1.0], 4)
     """
     names = _map_names(maps)
-    choice("kernel", "sobel3" if kernel == "sobel" else kernel, KERNELS)
+    choice("kernel", kernel, KERNELS)
     choice("convention", convention, CONVENTIONS)
     if progress is not None and not callable(progress):
         raise TypeError(f"progress must be callable, got {type(progress).__name__}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cache
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -129,8 +130,8 @@ def march(
     technique : str or Technique, default "exact"
         One of :func:`bumpwgpu.techniques.marching`.
     device : {"cpu", "gpu", "auto"}, default "cpu"
-        ``"gpu"`` runs the same search on the Vulkan device; ``"auto"`` does where there is real
-        graphics hardware and nothing is asked that only the CPU does.
+        ``"gpu"`` runs the same search on the Vulkan device in 32 bits; ``"auto"`` does so where there
+        is graphics hardware, the rays are float32, and they do not start on the surface.
     outputs : iterable of str
         Any of "t", "uv", "z", "normal", "steps", "status"; fewer are faster.
     from_surface : bool, default False
@@ -175,7 +176,7 @@ def march(
     starts, ways = _rays("origins", origins), _rays("directions", directions)
     choice("device", device, ("cpu", "gpu", "auto"))
     if device == "auto":
-        on_device = not from_surface and "float64" not in (starts.dtype, ways.dtype) and _bumpwgpu.has_hardware()
+        on_device = not from_surface and starts.dtype == ways.dtype == np.float32 and _has_hardware()
     else:
         on_device = device == "gpu"
     parameters = list(chosen.parameters.items())
@@ -195,6 +196,11 @@ def march(
         height_map._field, starts, ways, chosen.name, parameters, wanted, from_surface
     )
     return Hits(arrays)
+
+
+@cache
+def _has_hardware() -> bool:
+    return any(kind in ("discrete", "integrated") for *_, kind in _bumpwgpu.adapters())
 
 
 def _rays(name: str, values: Any) -> NDArray[Any]:

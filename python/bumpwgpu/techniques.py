@@ -44,7 +44,7 @@ class Technique:
     summary : str
         What it does, in one line.
     source : str
-        The work it comes from.
+        The work it comes from; empty for shading techniques, whose summary names it.
     parameters : dict of str to int
         The values of this object.
     """
@@ -129,12 +129,15 @@ def _class_name(name: str) -> str:
 
 def _make(entry: dict[str, Any]) -> type[Technique]:
     specs = tuple(Parameter(*spec) for spec in entry["parameters"])
-    lines = [entry["summary"], "", f"Source: {entry['source']}"]
+    lines = [entry["summary"]]
+    if entry["source"]:
+        lines += ["", f"Source: {entry['source']}"]
     if specs:
         lines += ["", "Parameters", "----------"]
-        for spec in specs:
-            lines += [f"{spec.name} : int, default {spec.default}", f"    {spec.summary} {spec.min} to {spec.max}."]
-    made = type(
+    for spec in specs:
+        lines.append(f"{spec.name} : int, default {spec.default}")
+        lines.append(f"    {spec.summary} {spec.min} to {spec.max}.")
+    return type(
         _class_name(entry["name"]),
         (Technique,),
         {
@@ -157,7 +160,6 @@ def _make(entry: dict[str, Any]) -> type[Technique]:
             "PARAMETERS": specs,
         },
     )
-    return made
 
 
 _CLASSES: dict[str, type[Technique]] = {entry["name"]: _make(entry) for entry in _bumpwgpu.techniques()}
@@ -209,7 +211,8 @@ def get(technique: str | Technique) -> Technique:
     if isinstance(technique, Technique):
         return technique
     if isinstance(technique, type) and issubclass(technique, Technique):
-        raise TypeError(f"technique must be an object: write {technique.__name__}() instead of {technique.__name__}")
+        name = technique.__name__
+        raise TypeError(f"technique must be an object: write {name}() instead of {name}")
     if not isinstance(technique, str):
         raise TypeError(f"technique must be a name or a techniques object, got {type(technique).__name__}")
     if technique not in _CLASSES:

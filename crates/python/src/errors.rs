@@ -7,12 +7,12 @@ use pyo3::exceptions::{
     PyFileNotFoundError, PyIsADirectoryError, PyPermissionError, PyValueError,
 };
 use pyo3::prelude::*;
+use render::RenderError;
 
 /// The exception classes, apart because the crates' own errors have the same names.
 pub mod classes {
     use pyo3::create_exception;
     use pyo3::exceptions::PyException;
-
 
     create_exception!(bumpwgpu, BumpError, PyException, "Base class of everything bumpwgpu raises on its own account.");
     create_exception!(bumpwgpu, MeshError, BumpError, "A mesh cannot be read, built or used.");
@@ -22,7 +22,7 @@ pub mod classes {
 }
 
 pub use classes::CompareError;
-use classes::{BakeError as PyBakeError, MeshError as PyMeshError};
+use classes::{BakeError as PyBakeError, MeshError as PyMeshError, RenderError as PyRenderError};
 
 /// Rust errors that stand for a Python exception.
 pub trait Raise {
@@ -81,6 +81,23 @@ impl Raise for MeshError {
             }
             Self::Parameter { .. } | Self::Arrays { .. } => PyValueError::new_err(message),
             _ => PyMeshError::new_err(message),
+        }
+    }
+}
+
+impl Raise for RenderError {
+    fn raise(self) -> PyErr {
+        match self {
+            Self::HeightField(error) => error.raise(),
+            Self::Bake(error) => error.raise(),
+            Self::Camera(_)
+            | Self::Size { .. }
+            | Self::Light { .. }
+            | Self::Material { .. }
+            | Self::Mesh { .. }
+            | Self::Scene(_)
+            | Self::UnknownTechnique { .. } => PyValueError::new_err(self.to_string()),
+            _ => PyRenderError::new_err(self.to_string()),
         }
     }
 }

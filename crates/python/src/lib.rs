@@ -10,6 +10,7 @@ mod field;
 mod images;
 mod march;
 mod mesh;
+mod rendering;
 mod run;
 mod system;
 
@@ -33,7 +34,9 @@ mod _bumpwgpu {
     #[pymodule_export]
     use crate::mesh::{PyMesh, tangent_methods};
     #[pymodule_export]
-    use crate::system::{adapters, simd_level, threads};
+    use crate::rendering::{PyMaterial, adapters, aov_names, march_gpu, render_scene};
+    #[pymodule_export]
+    use crate::system::{simd_level, threads};
 
     /// Version of the package.
     #[pymodule_export]

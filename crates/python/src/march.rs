@@ -42,19 +42,6 @@ pub fn parse_technique(name: &str, parameters: &[(String, f64)]) -> PyResult<Tec
         .map_err(Raise::raise)
 }
 
-/// Techniques that only shade and never look for where a ray meets the surface: name, what they
-/// do, where they come from.
-const SHADING: [(&str, &str, &str); 4] = [
-    ("flat", "The mesh as it is, without relief.", "none"),
-    ("bump", "Normals perturbed by the slope of the height map.", "Blinn 1978"),
-    ("normal", "Normals read from a tangent-space normal map.", "Cohen, Olano, Manocha 1998"),
-    (
-        "dot3",
-        "Fixed-function diffuse: 8-bit normal map and normalisation cube map, light per vertex.",
-        "Kilgard 2000",
-    ),
-];
-
 /// Everything known about each technique: shading ones first, then the registry of searches.
 #[pyfunction]
 pub fn techniques(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
@@ -69,8 +56,8 @@ pub fn techniques(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
         entry.set_item("parameters", parameters)?;
         list.append(entry)
     };
-    for (name, summary, source) in SHADING {
-        add(name, summary, source, false, false, Vec::new())?;
+    for (name, summary) in render::PLAIN_TECHNIQUES {
+        add(name, summary, "", false, false, Vec::new())?;
     }
     for info in Technique::all() {
         let parameters = info

@@ -33,9 +33,3 @@ pub fn simd_level() -> &'static str {
         "none"
     }
 }
-
-/// Placeholder until rendering is bound.
-#[pyfunction]
-pub fn adapters() -> Vec<(String, String, String, &'static str)> {
-    Vec::new()
-}

@@ -1,0 +1,234 @@
+//! Rendering, and marching on the device.
+
+use std::sync::Arc;
+
+use bake::{Image, Samples};
+use glam::{DVec3, Vec3};
+use heightfield::OutputSet;
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use render::{AovSet, Camera, Draw, Light, Request, Scene, TechniqueChoice};
+
+use crate::errors::Raise;
+use crate::field::Field;
+use crate::march::{hits_to_dict, parse_outputs, parse_technique};
+use crate::mesh::PyMesh;
+use crate::run::run;
+
+/// A material; shared, never changed, so that what was uploaded for it is kept between renderings.
+#[pyclass(frozen, module = "bumpwgpu._bumpwgpu", name = "Material")]
+pub struct PyMaterial {
+    inner: Arc<render::Material>,
+}
+
+#[pymethods]
+impl PyMaterial {
+    /// Takes an sRGB albedo `(H, W, 4)` and a normal map `(H, W, 3)` that holds `(n + 1) / 2`.
+    #[new]
+    fn new(
+        field: &Field,
+        albedo: Option<PyReadonlyArray3<'_, u8>>,
+        normal: Option<PyReadonlyArray3<'_, f32>>,
+        albedo_factor: [f32; 4],
+        specular: f32,
+        shininess: f32,
+        double_sided: bool,
+    ) -> PyResult<Self> {
+        let image = |shape: &[usize], samples| {
+            Image::new(shape[1], shape[0], shape[2], samples).map(Arc::new).map_err(Raise::raise)
+        };
+        let albedo = albedo
+            .map(|array| image(array.shape(), Samples::U8(array.as_slice()?.to_vec())))
+            .transpose()?;
+        let normal = normal
+            .map(|array| image(array.shape(), Samples::F32(array.as_slice()?.to_vec())))
+            .transpose()?;
+        Ok(Self {
+            inner: Arc::new(render::Material {
+                albedo,
+                normal,
+                albedo_factor,
+                specular,
+                shininess,
+                double_sided,
+                ..render::Material::new(field.shared())
+            }),
+        })
+    }
+}
+
+/// A technique that renders, from its name and parameter values.
+fn parse_choice(name: &str, parameters: &[(String, f64)]) -> PyResult<TechniqueChoice> {
+    match TechniqueChoice::named(name).map_err(Raise::raise)? {
+        TechniqueChoice::Search(_) => Ok(TechniqueChoice::Search(parse_technique(name, parameters)?)),
+        plain if parameters.is_empty() => Ok(plain),
+        _ => Err(PyValueError::new_err(format!("technique {name:?} has no parameters"))),
+    }
+}
+
+/// `(eye, target, up, vertical field of view in degrees)`.
+type CameraArg = ([f64; 3], [f64; 3], [f64; 3], f64);
+/// `(directional, direction or position, colour, intensity)`.
+type LightArg = (bool, [f64; 3], [f32; 3], f32);
+
+fn parse_light((directional, vector, color, intensity): LightArg) -> Light {
+    if directional {
+        let direction: Vec3 = DVec3::from(vector).as_vec3();
+        Light::Directional { direction, color, intensity }
+    } else {
+        Light::Point { position: DVec3::from(vector), color, intensity }
+    }
+}
+
+/// Renders runs of triangles `(mesh, first, end, material)` into a dict with `color`, `aovs`,
+/// `stats` and `warnings`.
+#[pyfunction(name = "render")]
+#[expect(clippy::too_many_arguments, reason = "one flat call from the Python facade")]
+pub fn render_scene<'py>(
+    py: Python<'py>,
+    draws: Vec<(Bound<'py, PyMesh>, u32, u32, Bound<'py, PyMaterial>)>,
+    camera: CameraArg,
+    lights: Vec<LightArg>,
+    ambient: [f32; 3],
+    background: [f32; 4],
+    technique: &str,
+    parameters: Vec<(String, f64)>,
+    size: [u32; 2],
+    shadows: Option<bool>,
+    aovs: Vec<String>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let technique = parse_choice(technique, &parameters)?;
+    let aovs = aovs.iter().try_fold(AovSet::NONE, |set, name| {
+        let known = || AovSet::NAMED.map(|(name, _)| name).join(", ");
+        AovSet::named(name)
+            .map(|aov| set | aov)
+            .ok_or_else(|| PyValueError::new_err(format!("unknown output {name:?}; known: {}", known())))
+    })?;
+    let draws: Vec<_> = draws
+        .iter()
+        .map(|(mesh, first, end, material)| {
+            (mesh.get().shared(), *first..*end, Arc::clone(&material.get().inner))
+        })
+        .collect();
+    let (eye, target, up, fov_y) = camera;
+    let frame = run(py, None, |_| {
+        let device = render::device()?;
+        let draws = draws
+            .iter()
+            .map(|(mesh, triangles, material)| Draw {
+                triangles: triangles.clone(),
+                ..Draw::new(mesh, material)
+            })
+            .collect();
+        let scene = Scene {
+            draws,
+            camera: Camera {
+                eye: eye.into(),
+                target: target.into(),
+                up: up.into(),
+                fov_y: fov_y.to_radians(),
+            },
+            lights: lights.into_iter().map(parse_light).collect(),
+            ambient,
+            background,
+        };
+        let request = Request { shadows, aovs, ..Request::new(technique, size[0], size[1]) };
+        render::render(&device, &scene, &request)
+    })?;
+    frame_to_dict(py, frame)
+}
+
+fn frame_to_dict(py: Python<'_>, frame: render::Frame) -> PyResult<Bound<'_, PyDict>> {
+    let (width, height) = (frame.width as usize, frame.height as usize);
+    let aovs = PyDict::new(py);
+    let plane = |name: &str, values: Option<Vec<f32>>, channels: usize| -> PyResult<()> {
+        match values {
+            None => Ok(()),
+            Some(values) if channels == 1 => {
+                aovs.set_item(name, PyArray1::from_vec(py, values).reshape([height, width])?)
+            }
+            Some(values) => {
+                aovs.set_item(name, PyArray1::from_vec(py, values).reshape([height, width, channels])?)
+            }
+        }
+    };
+    let from = frame.aovs;
+    plane("uv", from.uv, 2)?;
+    plane("depth", from.depth, 1)?;
+    plane("position", from.position, 3)?;
+    plane("normal", from.normal, 3)?;
+    plane("height", from.height, 1)?;
+    plane("steps", from.steps.map(|steps| steps.into_iter().map(|s| s as f32).collect()), 1)?;
+    plane("shadow", from.shadow, 1)?;
+    plane("mask", from.mask.map(|mask| mask.into_iter().map(f32::from).collect()), 1)?;
+    plane("ray_start", from.ray_start, 3)?;
+    plane("ray_delta", from.ray_delta, 3)?;
+    let s = frame.stats;
+    let stats = PyDict::new(py);
+    stats.set_item("prepare_ms", s.prepare_ms)?;
+    stats.set_item("compile_ms", s.compile_ms)?;
+    stats.set_item("draw_ms", s.draw_ms)?;
+    stats.set_item("device_clock", s.device_clock)?;
+    stats.set_item("readback_ms", s.readback_ms)?;
+    stats.set_item("total_ms", s.total_ms)?;
+    stats.set_item("maps_baked", s.maps_baked)?;
+    stats.set_item("triangles_drawn", s.triangles_drawn)?;
+    stats.set_item("triangles_culled", s.triangles_culled)?;
+    stats.set_item("pixels_covered", s.pixels_covered)?;
+    stats.set_item("pixels_marched", s.pixels_marched)?;
+    stats.set_item("pixels_skipped", s.pixels_covered.saturating_sub(s.pixels_marched))?;
+    stats.set_item("pixels_unconverged", s.pixels_unconverged)?;
+    stats.set_item("steps", s.steps)?;
+    stats.set_item("shadow_rays", s.shadow_rays)?;
+    let dict = PyDict::new(py);
+    dict.set_item("color", PyArray1::from_vec(py, frame.color).reshape([height, width, 4])?)?;
+    dict.set_item("aovs", aovs)?;
+    dict.set_item("stats", stats)?;
+    dict.set_item("warnings", frame.warnings)?;
+    Ok(dict)
+}
+
+/// Names of the additional outputs.
+#[pyfunction]
+pub fn aov_names() -> Vec<&'static str> {
+    AovSet::NAMED.map(|(name, _)| name).to_vec()
+}
+
+/// Marches on the device: the outputs, and the seconds it took there.
+#[pyfunction]
+pub fn march_gpu<'py>(
+    py: Python<'py>,
+    field: &Field,
+    origins: PyReadonlyArray2<'py, f32>,
+    directions: PyReadonlyArray2<'py, f32>,
+    technique: &str,
+    parameters: Vec<(String, f64)>,
+    outputs: Vec<String>,
+) -> PyResult<(Bound<'py, PyDict>, f64)> {
+    let technique = parse_technique(technique, &parameters)?;
+    let wanted = parse_outputs(&outputs)?;
+    let field = field.shared();
+    let (origins, directions) = (origins.as_slice()?, directions.as_slice()?);
+    let found = run(py, None, |_| {
+        let device = render::device()?;
+        render::march(&device, &field, &technique, origins, directions)
+    })?;
+    // The device answers everything at once; what was not asked for is dropped here.
+    let mut hits = found.hits;
+    hits.t.take_if(|_| !wanted.contains(OutputSet::T));
+    hits.uv.take_if(|_| !wanted.contains(OutputSet::UV));
+    hits.z.take_if(|_| !wanted.contains(OutputSet::Z));
+    hits.normal.take_if(|_| !wanted.contains(OutputSet::NORMAL));
+    hits.steps.take_if(|_| !wanted.contains(OutputSet::STEPS));
+    hits.status.take_if(|_| !wanted.contains(OutputSet::STATUS));
+    Ok((hits_to_dict(py, hits)?, found.device_seconds))
+}
+
+/// Name, driver, driver version and kind of every Vulkan device, the preferred one first.
+#[pyfunction]
+pub fn adapters(py: Python<'_>) -> PyResult<Vec<(String, String, String, &'static str)>> {
+    let found = run(py, None, |_| Ok::<_, std::convert::Infallible>(render::adapters()))?;
+    Ok(found.into_iter().map(|info| (info.name, info.driver, info.driver_info, info.kind)).collect())
+}

@@ -1,0 +1,210 @@
+"""The compiled half of bumpwgpu; use the package instead."""
+
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, Final, TypeAlias, TypedDict, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+_Path: TypeAlias = str | os.PathLike[str]
+_Parameters: TypeAlias = Sequence[tuple[str, float]]
+_Setting: TypeAlias = tuple[str, _Parameters]
+_Progress: TypeAlias = Callable[..., object] | None
+_Vector: TypeAlias = tuple[float, float, float]
+_Color: TypeAlias = tuple[float, float, float, float]
+_Decoded: TypeAlias = tuple[NDArray[Any], list[str], list[str]]
+
+VERSION: Final[str]
+MAX_SIDE: Final[int]
+
+class BumpError(Exception): ...
+class BakeError(BumpError): ...
+class CompareError(BumpError): ...
+class MeshError(BumpError): ...
+class RenderError(BumpError): ...
+
+class _TechniqueEntry(TypedDict):
+    name: str
+    summary: str
+    source: str
+    casts_shadows: bool
+    marches: bool
+    parameters: list[tuple[str, str, int, int, int]]
+
+class _RenderResult(TypedDict):
+    color: NDArray[np.uint8]
+    aovs: dict[str, NDArray[np.float32]]
+    stats: dict[str, Any]
+    warnings: list[str]
+
+class _MaterialEntry(TypedDict):
+    name: str
+    albedo: Path | bytes | None
+    normal: Path | bytes | None
+    bump: Path | bytes | None
+    displacement: Path | bytes | None
+    albedo_factor: _Color
+    specular: float
+    shininess: float
+    bump_scale: float
+    displacement_scale: float
+    normal_scale: float
+
+@final
+class Field:
+    def __new__(
+        cls, heights: NDArray[np.float32], wrap: str, extent: tuple[float, float, tuple[float, float]]
+    ) -> Field: ...
+
+@final
+class Material:
+    def __new__(
+        cls,
+        field: Field,
+        albedo: NDArray[np.uint8] | None,
+        normal: NDArray[np.float32] | None,
+        albedo_factor: _Color,
+        specular: float,
+        shininess: float,
+        double_sided: bool,
+    ) -> Material: ...
+
+@final
+class Mesh:
+    @staticmethod
+    def open(path: _Path) -> Mesh: ...
+    @staticmethod
+    def rectangle(width: float, height: float) -> Mesh: ...
+    @staticmethod
+    def cube(size: float) -> Mesh: ...
+    @staticmethod
+    def sphere(radius: float, segments: int) -> Mesh: ...
+    @staticmethod
+    def torus(major: float, minor: float, major_segments: int, minor_segments: int) -> Mesh: ...
+    @staticmethod
+    def from_arrays(
+        positions: NDArray[np.float32],
+        indices: NDArray[np.uint32],
+        uvs: NDArray[np.float32],
+        normals: NDArray[np.float32] | None,
+        tangents: NDArray[np.float32] | None,
+    ) -> Mesh: ...
+    @property
+    def positions(self) -> NDArray[np.float32]: ...
+    @property
+    def normals(self) -> NDArray[np.float32]: ...
+    @property
+    def uvs(self) -> NDArray[np.float32]: ...
+    @property
+    def indices(self) -> NDArray[np.uint32]: ...
+    @property
+    def stored_tangents(self) -> NDArray[np.float32]: ...
+    @property
+    def dpdu(self) -> NDArray[np.float32]: ...
+    @property
+    def dpdv(self) -> NDArray[np.float32]: ...
+    @property
+    def warnings(self) -> list[str]: ...
+    @property
+    def parts(self) -> list[tuple[str, int, int, int | None]]: ...
+    @property
+    def materials(self) -> list[_MaterialEntry]: ...
+    @property
+    def counts(self) -> tuple[int, int]: ...
+    @property
+    def bounds(self) -> tuple[_Vector, _Vector]: ...
+    def tangents(
+        self, method: str
+    ) -> tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.uint32], list[str]]: ...
+
+@final
+class CompareView:
+    def __new__(cls, field: Field, width: int, height: int) -> CompareView: ...
+    def picture(self, technique: str, parameters: _Parameters) -> tuple[NDArray[np.uint8], NDArray[np.float32]]: ...
+
+@final
+class SegmentReference:
+    def __new__(
+        cls, field: Field, starts: NDArray[np.float32], deltas: NDArray[np.float32]
+    ) -> SegmentReference: ...
+    def measure(
+        self, uv: NDArray[np.float32], z: NDArray[np.float32], group: NDArray[np.uint8], groups: int
+    ) -> tuple[dict[str, Any], list[dict[str, Any]], NDArray[np.float32]]: ...
+
+def adapters() -> list[tuple[str, str, str, str]]: ...
+def aov_names() -> list[str]: ...
+def bake_map(
+    field: Field,
+    map: str,
+    kernel: str,
+    convention: str,
+    progress: _Progress,
+    first: int,
+    total: int,
+) -> list[NDArray[np.float32]]: ...
+def bake_names() -> tuple[list[tuple[str, str]], list[str]]: ...
+def compare_front(
+    measured: Sequence[tuple[str, Sequence[float], float, float]], max_failure_rate: float
+) -> list[int]: ...
+def compare_planar(
+    field: Field,
+    techniques: Sequence[_Setting],
+    elevations: Sequence[float],
+    rays: int,
+    repeats: int,
+    seed: int,
+    device: str,
+    progress: _Progress,
+) -> tuple[list[dict[str, Any]], str | None]: ...
+def compare_recommend(
+    measured: Sequence[tuple[str, Sequence[float], float, float]],
+    max_error_texels: float,
+    max_failure_rate: float,
+) -> tuple[int | None, str]: ...
+def decode_image(data: bytes) -> _Decoded: ...
+def effective_bits(samples: NDArray[Any]) -> int: ...
+def march(
+    field: Field,
+    origins: NDArray[Any],
+    directions: NDArray[Any],
+    technique: str,
+    parameters: _Parameters,
+    outputs: Sequence[str],
+    from_surface: bool,
+) -> dict[str, NDArray[Any]]: ...
+def march_gpu(
+    field: Field,
+    origins: NDArray[np.float32],
+    directions: NDArray[np.float32],
+    technique: str,
+    parameters: _Parameters,
+    outputs: Sequence[str],
+) -> tuple[dict[str, NDArray[Any]], float]: ...
+def read_image(path: _Path) -> _Decoded: ...
+def render(
+    draws: Sequence[tuple[Mesh, int, int, Material]],
+    camera: tuple[_Vector, _Vector, _Vector, float],
+    lights: Sequence[tuple[bool, _Vector, _Vector, float]],
+    ambient: _Vector,
+    background: _Color,
+    technique: str,
+    parameters: _Parameters,
+    size: tuple[int, int],
+    shadows: bool | None,
+    aovs: Sequence[str],
+) -> _RenderResult: ...
+def save_map(
+    map: str,
+    layers: Sequence[NDArray[np.float32]],
+    folder: _Path,
+    prefix: str,
+    format: str,
+    bits: int,
+) -> list[Path]: ...
+def simd_level() -> str: ...
+def tangent_methods() -> list[str]: ...
+def techniques() -> list[_TechniqueEntry]: ...
+def threads() -> int: ...
+def write_image(path: _Path, pixels: NDArray[Any]) -> None: ...
