@@ -44,7 +44,7 @@ pub enum BakeError {
         problem: String,
     },
     /// The file may be fine, but this crate does not read that variety.
-    #[error("{format}: {feature} is not supported")]
+    #[error("{format} variety not supported: {feature}")]
     Unsupported {
         /// Format name.
         format: &'static str,
@@ -52,7 +52,7 @@ pub enum BakeError {
         feature: String,
     },
     /// The image is larger than what is accepted or what fits into memory.
-    #[error("image of {width} x {height} texels with {channels} channels needs {bytes} bytes; {limit}")]
+    #[error("image of {width} x {height} texels x {channels} samples needs {bytes} bytes; {limit}")]
     TooLarge {
         /// Texels across.
         width: u64,
@@ -66,7 +66,7 @@ pub enum BakeError {
         limit: String,
     },
     /// Size and number of samples of an image do not agree.
-    #[error("image of {width} x {height} texels with {channels} channels cannot have {got} samples")]
+    #[error("image of {width} x {height} texels x {channels} channels cannot have {got} samples")]
     Shape {
         /// Texels across.
         width: usize,

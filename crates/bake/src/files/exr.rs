@@ -33,7 +33,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Image, BakeError> {
     let part = meta.headers.iter().position(|header| !header.deep).ok_or_else(|| unsupported("deep data"))?;
     let header = &meta.headers[part];
     if let Some(channel) = header.channels.list.iter().find(|channel| channel.sampling != Vec2(1, 1)) {
-        return Err(unsupported(&format!("channel {:?}, which is subsampled,", channel.name.to_string())));
+        return Err(unsupported(&format!("subsampled channel {:?}", channel.name.to_string())));
     }
     let chunks: u128 = meta.headers.iter().map(|header| header.chunk_count as u128).sum();
     if 8 * chunks > bytes.len() as u128 {

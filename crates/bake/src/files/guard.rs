@@ -38,7 +38,8 @@ impl Claim {
             limit,
         };
         if samples == 0 {
-            let problem = format!("the image is {} x {} x {}", self.width, self.height, self.channels);
+            let problem =
+                format!("the image is {} x {} texels x {} samples", self.width, self.height, self.channels);
             return Err(BakeError::Malformed { format: self.format, problem });
         }
         if samples > MAX_SAMPLES {

@@ -1,5 +1,6 @@
 //! PNG, JPEG, WebP, BMP and TGA, through the `image` crate.
 
+use std::error::Error;
 use std::io::Cursor;
 
 use ::image::codecs::bmp::BmpDecoder;
@@ -35,7 +36,9 @@ pub(super) fn decode(bytes: &[u8], format: ImageFormat) -> Result<Image, BakeErr
 
 fn decode_png(bytes: &[u8]) -> Result<Image, BakeError> {
     // The decoder wants its limit before it tells the size.
-    let (width, height) = marks::png_size(bytes).unwrap_or_default();
+    let Some((width, height)) = marks::png_size(bytes) else {
+        return Err(BakeError::Malformed { format: "PNG", problem: "it has no header".to_owned() });
+    };
     let claim = Claim {
         format: "PNG",
         width: width.into(),
@@ -89,9 +92,11 @@ fn finish<D: ImageDecoder>(
 }
 
 fn explain(format: &'static str, error: &ImageError) -> BakeError {
+    // The error inside says the same without repeating the format.
+    let text = error.source().map_or_else(|| error.to_string(), ToString::to_string);
     match error {
-        ImageError::Unsupported(error) => BakeError::Unsupported { format, feature: error.to_string() },
-        other => BakeError::Malformed { format, problem: other.to_string() },
+        ImageError::Unsupported(_) => BakeError::Unsupported { format, feature: text },
+        _ => BakeError::Malformed { format, problem: text },
     }
 }
 

@@ -38,7 +38,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Image, BakeError> {
     limits.intermediate_buffer_size = limits.intermediate_buffer_size.max(bytes.len());
     let mut decoder = decoder.with_limits(limits.clone());
     let shape = Shape { width: width as usize, height: height as usize, channels, bits };
-    let (result, found) = read(&mut decoder, &shape, &limits).map_err(explain)?;
+    let (result, found) = read(&mut decoder, &shape, &limits)?;
     let mut warnings = Vec::new();
     let samples = convert(result, &shape, &found, &mut warnings)?;
     let mut image = Image::new(shape.width, shape.height, channels, samples)?;
@@ -95,15 +95,18 @@ fn read(
     decoder: &mut Decoder<Cursor<&[u8]>>,
     shape: &Shape,
     limits: &Limits,
-) -> Result<(DecodingResult, BufferLayoutPreference), TiffError> {
+) -> Result<(DecodingResult, BufferLayoutPreference), BakeError> {
     let mut result = DecodingResult::U8(Vec::new());
-    let layout = decoder.image_buffer_layout()?;
-    if layout.planes > 1 && decoder.get_chunk_type() == ChunkType::Tile && shape.bits >= 8 {
-        result.resize_to(&layout, limits)?;
-        read_tiled_planes(decoder, shape, result.as_buffer(0).as_bytes_mut())?;
+    let layout = decoder.image_buffer_layout().map_err(explain)?;
+    if layout.planes > 1 && shape.bits < 8 {
+        return Err(unsupported(format!("{} bits a sample in planes", shape.bits)));
+    }
+    if layout.planes > 1 && decoder.get_chunk_type() == ChunkType::Tile {
+        result.resize_to(&layout, limits).map_err(explain)?;
+        read_tiled_planes(decoder, shape, result.as_buffer(0).as_bytes_mut()).map_err(explain)?;
         return Ok((result, layout));
     }
-    let layout = decoder.read_image_to_buffer(&mut result)?;
+    let layout = decoder.read_image_to_buffer(&mut result).map_err(explain)?;
     Ok((result, layout))
 }
 
@@ -149,7 +152,7 @@ fn convert(
         warnings.push("the TIFF holds signed integers: taken as numbers, not scaled to 0..1".to_owned());
     };
     let samples = match result {
-        DecodingResult::U8(packed) if shape.bits < 8 => Samples::U8(unpack(&packed, shape, found)?),
+        DecodingResult::U8(packed) if shape.bits < 8 => Samples::U8(unpack(&packed, shape)?),
         DecodingResult::U8(samples) => Samples::U8(interleave(samples, shape, found)?),
         DecodingResult::U16(samples) => Samples::U16(interleave(samples, shape, found)?),
         DecodingResult::U32(samples) => {
@@ -212,10 +215,7 @@ fn interleave<T: Copy>(
 }
 
 /// Widens samples of 1, 2 or 4 bits to 8, so that their full value is 255. Rows start at a byte.
-fn unpack(packed: &[u8], shape: &Shape, found: &BufferLayoutPreference) -> Result<Vec<u8>, BakeError> {
-    if found.planes > 1 {
-        return Err(unsupported(format!("{} bits a sample in planes", shape.bits)));
-    }
+fn unpack(packed: &[u8], shape: &Shape) -> Result<Vec<u8>, BakeError> {
     let across = shape.width * shape.channels;
     let bits = usize::from(shape.bits);
     let row_bytes = (across * bits).div_ceil(8);
