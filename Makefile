@@ -54,7 +54,7 @@ lint: extension ## formatting, clippy, ruff, mypy, stubtest
 	.venv/bin/ruff check
 	.venv/bin/ruff format --check
 	.venv/bin/mypy
-	$(PY) -m mypy.stubtest bumpwgpu
+	$(PY) -m mypy.stubtest --mypy-config-file pyproject.toml bumpwgpu
 
 clean: ## remove what the build and the demo wrote
 	rm -rf target dist demo_output python/bumpwgpu/*.so .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -46,6 +46,8 @@ ELEVATIONS = (90, 45, 20, 10, 5)
 MAX_ERROR_TEXELS = 0.5
 # Share of a comparison in the progress bar, in pictures.
 COMPARE_STEPS = 20
+# The terrain's relief is 1/36 of its width: pictures show it steeper, maps and comparisons true to scale.
+EXAGGERATION = 3.0
 Step = Callable[[str, int], None]
 METRES_PER_DEGREE = 111_320.0
 
@@ -95,7 +97,8 @@ def terrain() -> Subject:
     )
     about = (
         f"Jacksboro fault, Tennessee: {columns} x {rows} samples, "
-        f"{width / 1000:.1f} x {depth / 1000:.1f} km, {low:.0f} to {high:.0f} m, true to scale"
+        f"{width / 1000:.1f} x {depth / 1000:.1f} km, {low:.0f} to {high:.0f} m; pictures with "
+        f"heights x {EXAGGERATION:g}, maps and comparison true to scale"
     )
     return Subject("terrain", about, height, albedo.astype(np.uint8), tiles=False)
 
@@ -137,7 +140,7 @@ def views(subject: Subject) -> dict[str, View]:
     ring = tiled(bw.Mesh.torus(), (6, 3) if subject.tiles else (4, 2))
     return {
         "quad": View(
-            quad, bw.Camera.look_at((0.0, -0.95, 0.42), (0.0, -0.06, 0.0), up=(0, 0, 1), fov_y=44.0), (sun,)
+            quad, bw.Camera.look_at((0.0, -1.05, 0.55), (0.0, -0.14, 0.0), up=(0, 0, 1), fov_y=46.0), (sun,)
         ),
         "cube": View(
             bw.Mesh.cube(), bw.Camera.look_at((1.25, 1.0, 1.55), (0, 0, 0), fov_y=40.0), (above, lamp)
@@ -163,7 +166,10 @@ def contact_sheet(rows: dict[str, list[tuple[str, Path]]], path: Path, cell: int
 
 def material(subject: Subject) -> bw.Material:
     """Height and colour; a renderer needs no more, every other map is baked from them."""
-    return bw.Material(height=subject.height, albedo=subject.albedo, specular=0.15, shininess=24.0)
+    scale = subject.height.scale * (1.0 if subject.tiles else EXAGGERATION)
+    return bw.Material(
+        height=subject.height.replace(scale=scale), albedo=subject.albedo, specular=0.15, shininess=24.0
+    )
 
 
 def bake(subject: Subject, folder: Path, step: Step) -> None:
@@ -201,7 +207,7 @@ def compare(subject: Subject, name: str, source: Any, folder: Path, step: Step) 
         step(f"comparing {subject.name}, {name}: {text}", now - last)
         last = now
 
-    result = bw.compare(source, elevations=ELEVATIONS, repeats=3, progress=progress)
+    result = bw.compare(source, elevations=ELEVATIONS, rays=4096, repeats=3, progress=progress)
     stem = folder / f"{subject.name}_{name}"
     result.plot(stem.with_suffix(".png"))
     result.to_json(stem.with_suffix(".json"))
