@@ -1,17 +1,22 @@
 // A ray against one bilinear cell. Twin of `first_root` in crates/heightfield/src/search/exact.rs.
 
-// First `s` in 0..length where the ray is on or below the patch, or -1.
-//
-// heights: h00, h10, h01, h11 (first digit along x); local: where the ray enters, 0..1; z: its height
-// there; direction: cells and height for one unit of s. With from_surface the start is itself a root
-// and only the other one counts.
-fn bilinear_root(heights: vec4f, local: vec2f, z: f32, direction: vec3f, length: f32, from_surface: bool) -> f32 {
+// Height of the patch at `local`, 0..1 along x and y. heights: h00, h10, h01, h11 (first digit along x).
+fn bilinear_height(heights: vec4f, local: vec2f) -> f32 {
     let along = vec2f(heights.y - heights.x, heights.z - heights.x);
     let twist = (heights.w - heights.y) - (heights.z - heights.x);
-    let gap = z - (heights.x + local.x * along.x + local.y * (along.y + local.x * twist));
+    return heights.x + local.x * along.x + local.y * (along.y + local.x * twist);
+}
+
+// First `s` in 0..length where the ray is on or below the patch, or -1.
+//
+// local: where the ray enters; gap: its height above the patch there; direction: cells and height for
+// one unit of s. With on_surface the start is itself a root and only the other one counts.
+fn bilinear_root(heights: vec4f, local: vec2f, gap: f32, direction: vec3f, length: f32, on_surface: bool) -> f32 {
+    let along = vec2f(heights.y - heights.x, heights.z - heights.x);
+    let twist = (heights.w - heights.y) - (heights.z - heights.x);
     let slope = direction.z - (along.x + local.y * twist) * direction.x - (along.y + local.x * twist) * direction.y;
     let bend = -twist * direction.x * direction.y;
-    if from_surface {
+    if on_surface {
         if slope < 0.0 || (slope == 0.0 && bend < 0.0) {
             return 0.0;
         }

@@ -12,6 +12,16 @@
 #import "bindings/pyramid.wgsl"
 
 const MAX_STEPS: u32 = 16384u;
+// Farther from the surface than this, a start is not on it.
+const ON_SURFACE: f32 = 1e-3;
+// Rounding of a height: 8 ulps of 1.
+const ROUNDING: f32 = 9.5e-7;
+
+// The four corner heights of a cell, the first at index `at`.
+fn bilinear_cell(at: u32) -> vec4f {
+    let below = at + height_info.cells.x + 1u;
+    return vec4f(corners[at], corners[at + 1u], corners[below], corners[below + 1u]);
+}
 
 fn trace(start: vec3f, delta: vec3f, from_surface: bool) -> Found {
     let periodic = height_info.wrap != 1u;
@@ -30,6 +40,7 @@ fn trace(start: vec3f, delta: vec3f, from_surface: bool) -> Found {
     x.node >>= level;
     y.node >>= level;
     var t = 0.0;
+    var z_start = start.z;
     var first = from_surface;
     for (var steps = 1u; steps <= MAX_STEPS; steps++) {
         let nodes = height_info.levels[level];
@@ -37,29 +48,34 @@ fn trace(start: vec3f, delta: vec3f, from_surface: bool) -> Found {
         let exit_x = axis_exit(x, level);
         let exit_y = axis_exit(y, level);
         let exit = min(exit_x, exit_y);
-        let lowest = start.z + dz * select(t, exit, dz < 0.0);
+        let lowest = z_start + dz * select(t, exit, dz < 0.0);
         if lowest <= maximum {
             if level > 0u {
                 if dz < 0.0 {
-                    t = min(max(t, (maximum - start.z) / dz), exit);
+                    t = min(max(t, (maximum - z_start) / dz), exit);
                 }
                 x = axis_descend(x, level, t);
                 y = axis_descend(y, level, t);
                 level -= 1u;
                 continue;
             }
-            let at = y.node * (height_info.cells.x + 1u) + x.node;
-            let below = at + height_info.cells.x + 1u;
-            let patch_heights = vec4f(corners[at], corners[at + 1u], corners[below], corners[below + 1u]);
+            let cell = bilinear_cell(y.node * (height_info.cells.x + 1u) + x.node);
             let local = vec2f(axis_local(x, t, direction.x), axis_local(y, t, direction.y));
-            let s = bilinear_root(patch_heights, local, start.z + dz * t, direction, exit - t, first);
+            var gap = z_start + dz * t - bilinear_height(cell, local);
+            if first && abs(gap) <= ON_SURFACE {
+                z_start -= gap;
+                gap = 0.0;
+            }
+            // A light ray that enters a cell on the surface still leaves the point it started from.
+            let on_surface = from_surface && abs(gap) <= ROUNDING;
+            let s = bilinear_root(cell, local, gap, direction, exit - t, on_surface);
             if s >= 0.0 {
                 return found_hit(t + s, steps);
             }
         }
         first = false;
         t = max(t, exit);
-        if t >= FAR || (dz > 0.0 && start.z + dz * t > height_info.highest) {
+        if t >= FAR || (dz > 0.0 && z_start + dz * t > height_info.highest) {
             return found_left(steps);
         }
         var crossed: bool;

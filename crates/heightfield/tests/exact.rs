@@ -277,3 +277,22 @@ fn a_batch_gives_what_single_rays_give() {
     assert_eq!(again.z.unwrap(), z);
     assert!(again.t.is_none() && again.status.is_none());
 }
+
+#[test]
+fn lit_points_do_not_shadow_themselves() {
+    // Every light ray rises faster than any slope of the map, so nothing can be in its way.
+    let exact = Technique::named("exact").unwrap();
+    let rough = noise(300, 200, Wrap::Repeat, 12);
+    let field = from_fn(300, 200, Wrap::Repeat, |i, j| 0.4 + 0.1 * rough.texel(i as i64, j as i64));
+    let mut random = Random(13);
+    let mut blocked = 0;
+    for _ in 0..200_000 {
+        let (u, v) = (random.next() as f32, random.next() as f32);
+        let start = glam::Vec3::new(u, v, field.sample(u, v));
+        let azimuth = random.range(0.0, std::f64::consts::TAU);
+        let lateral = random.range(0.0, 0.7 / (0.2 * 300.0));
+        let delta = glam::DVec3::new(lateral * azimuth.cos(), lateral * azimuth.sin(), 1.0).as_vec3();
+        blocked += usize::from(exact.occluded(&field, start, delta * 0.5, 1.0));
+    }
+    assert_eq!(blocked, 0, "of 200000 lit points");
+}

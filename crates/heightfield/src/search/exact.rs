@@ -37,9 +37,13 @@ pub struct CellRay<T> {
     pub start: [T; 3],
     /// Direction, for one unit of the parameter.
     pub direction: [T; 3],
-    /// Whether the start lies on the surface, which then does not count as a hit.
+    /// Whether the start lies on the surface, which then does not count as a hit. Rounding is taken
+    /// off: the ray starts at the very height of its cell.
     pub from_surface: bool,
 }
+
+/// Farther from the surface than this, a start is not on it, whatever the caller says.
+const ON_SURFACE: f64 = 1e-3;
 
 /// Where a ray met the surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -226,7 +230,8 @@ pub fn trace<T: Float + FromPrimitive>(
     let zero = T::zero();
     let [nx, ny] = field.cells();
     let [dx, dy, dz] = ray.direction;
-    let z_start = ray.start[2];
+    let mut z_start = ray.start[2];
+    let rounding = T::epsilon() * int::<T>(8);
     let mut x = Axis::new(ray.start[0], dx, nx, field.is_periodic());
     let mut y = Axis::new(ray.start[1], dy, ny, field.is_periodic());
     let done = |status, t, x: &Axis<T>, y: &Axis<T>, local, steps| CellHit {
@@ -272,12 +277,18 @@ pub fn trace<T: Float + FromPrimitive>(
             let (lx, ly) = (x.local(t, dx), y.local(t, dy));
             let (along_x, along_y, twist) = (h10 - h00, h01 - h00, h11 - h10 - h01 + h00);
             let height = h00 + lx * along_x + ly * (along_y + lx * twist);
-            let gap = z_start + dz * t - height;
+            let mut gap = z_start + dz * t - height;
+            if first && gap.abs() <= T::from(ON_SURFACE).unwrap_or_else(zero_of) {
+                z_start = z_start - gap;
+                gap = zero;
+            }
+            // A light ray that enters a cell on the surface still leaves the point it started from.
+            let on_surface = ray.from_surface && gap.abs() <= rounding;
             let slope = dz
                 - (along_x + ly * twist) * moving(dx, along_x, twist)
                 - (along_y + lx * twist) * moving(dy, along_y, twist);
             let bend = if twist == zero { zero } else { -twist * dx * dy };
-            if let Some(s) = first_root(gap, slope, bend, exit - t, first) {
+            if let Some(s) = first_root(gap, slope, bend, exit - t, on_surface) {
                 let hit = t + s;
                 let local = [x.local(hit, dx), y.local(hit, dy)];
                 return done(Status::Hit, hit, &x, &y, local, steps);
