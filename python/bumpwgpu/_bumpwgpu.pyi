@@ -16,6 +16,40 @@ _Vector: TypeAlias = tuple[float, float, float]
 _Color: TypeAlias = tuple[float, float, float, float]
 _Decoded: TypeAlias = tuple[NDArray[Any], list[str], list[str]]
 
+__all__ = [
+    "MAX_SIDE",
+    "VERSION",
+    "BakeError",
+    "BumpError",
+    "CompareError",
+    "CompareView",
+    "Field",
+    "Material",
+    "Mesh",
+    "MeshError",
+    "RenderError",
+    "SegmentReference",
+    "adapters",
+    "aov_names",
+    "bake_map",
+    "bake_names",
+    "compare_front",
+    "compare_planar",
+    "compare_recommend",
+    "decode_image",
+    "effective_bits",
+    "march",
+    "march_gpu",
+    "read_image",
+    "render",
+    "save_map",
+    "simd_level",
+    "tangent_methods",
+    "techniques",
+    "threads",
+    "write_image",
+]
+
 VERSION: Final[str]
 MAX_SIDE: Final[int]
 
@@ -115,6 +149,7 @@ class Mesh:
     def counts(self) -> tuple[int, int]: ...
     @property
     def bounds(self) -> tuple[_Vector, _Vector]: ...
+    def with_tangents(self, method: str) -> Mesh: ...
     def tangents(
         self, method: str
     ) -> tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.uint32], list[str]]: ...
@@ -122,7 +157,9 @@ class Mesh:
 @final
 class CompareView:
     def __new__(cls, field: Field, width: int, height: int) -> CompareView: ...
-    def picture(self, technique: str, parameters: _Parameters) -> tuple[NDArray[np.uint8], NDArray[np.float32]]: ...
+    def picture(
+        self, technique: str, parameters: _Parameters
+    ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]: ...
 
 @final
 class SegmentReference:
@@ -130,7 +167,12 @@ class SegmentReference:
         cls, field: Field, starts: NDArray[np.float32], deltas: NDArray[np.float32]
     ) -> SegmentReference: ...
     def measure(
-        self, uv: NDArray[np.float32], z: NDArray[np.float32], group: NDArray[np.uint8], groups: int
+        self,
+        uv: NDArray[np.float32],
+        z: NDArray[np.float32],
+        status: NDArray[np.uint8],
+        group: NDArray[np.uint8],
+        groups: int,
     ) -> tuple[dict[str, Any], list[dict[str, Any]], NDArray[np.float32]]: ...
 
 def adapters() -> list[tuple[str, str, str, str]]: ...

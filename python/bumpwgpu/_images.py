@@ -66,7 +66,9 @@ def read_npy(path: Path) -> Pixels:
             need *= int(side)
         have = os.fstat(file.fileno()).st_size - file.tell()
         if any(side < 0 for side in shape) or need > have:
-            raise BakeError(f"{path}: header announces shape {shape} of {dtype}, {need} bytes, but {have} follow")
+            raise BakeError(
+                f"{path}: header announces shape {shape} of {dtype}, {need} bytes, but {have} follow"
+            )
         file.seek(0)
         try:
             values = np.load(file, allow_pickle=False)
@@ -84,7 +86,9 @@ def read_any(source: Any, label: str) -> Pixels:
         if path.suffix.lower() == ".npy":
             return read_npy(path)
         if path.suffix.lower() == ".npz":
-            raise ValueError(f"{path}: an .npz holds several arrays; load it and pass one, np.load(path)[key]")
+            raise ValueError(
+                f"{path}: an .npz holds several arrays; load it and pass one, np.load(path)[key]"
+            )
         if "\0" in str(path):
             raise ValueError(f"{label}: path contains a null character")
         values, names, texts = _bumpwgpu.read_image(path)

@@ -218,7 +218,9 @@ def bake(
         raise TypeError("bake takes height maps; mesh.tangents() gives a mesh's tangent frames")
     if isinstance(source, HeightMap):
         if options:
-            raise TypeError(f"bake() got unexpected options {', '.join(options)}; source is a HeightMap already")
+            raise TypeError(
+                f"bake() got unexpected options {', '.join(options)}; source is a HeightMap already"
+            )
         heights = source
     else:
         heights = HeightMap(source, **options)

@@ -314,7 +314,9 @@ def _pick_channel(
     if rows == 0 or columns == 0 or values.size == 0:
         raise ValueError(f"{label} is empty: shape {values.shape}")
     if max(rows, columns) > _bumpwgpu.MAX_SIDE:
-        raise ValueError(f"{label} is {columns} x {rows} texels; each side may be at most {_bumpwgpu.MAX_SIDE}")
+        raise ValueError(
+            f"{label} is {columns} x {rows} texels; each side may be at most {_bumpwgpu.MAX_SIDE}"
+        )
     planes = values if values.ndim == 3 else values[:, :, np.newaxis]
     count = planes.shape[2]
     if channel is not None:
@@ -327,8 +329,8 @@ def _pick_channel(
     if alpha_says_nothing and all(_same_grey(planes[:, :, 0], planes[:, :, at]) for at in range(1, colours)):
         return planes[:, :, min(1, colours - 1)], label
     raise ValueError(
-        f"{label} has {count} channels that differ; say which one holds the heights with channel=0..{count - 1}"
-        ' or channel="r", "g", "b", "a"'
+        f"{label} has {count} channels that differ; say which one holds the heights with "
+        f'channel=0..{count - 1} or channel="r", "g", "b", "a"'
     )
 
 
@@ -395,8 +397,8 @@ def _normalise(plane: NDArray[Any], height_range: Any, label: str) -> tuple[NDAr
         return np.divide(plane, np.float32(np.iinfo(plane.dtype).max), dtype=np.float32), bits
     if kind in "ui":
         raise ValueError(
-            f"{label} holds {plane.dtype} from {plane.min()} to {plane.max()}; only uint8 and uint16 have a meaning "
-            'of their own, so say what becomes 0 and 1 with height_range="auto" or height_range=(low, high)'
+            f"{label} holds {plane.dtype} from {plane.min()} to {plane.max()}; only uint8 and uint16 have a "
+            'meaning of their own: pass height_range="auto" or height_range=(low, high)'
         )
     return _within_unit(plane, label), bits
 
@@ -425,7 +427,9 @@ def _stretch(plane: NDArray[Any], height_range: Any, label: str) -> NDArray[np.f
             raise ValueError(f'height_range must be None, "auto" or (low, high), got {height_range!r}')
         low, high = float(wide.min()), float(wide.max())
         if low == high:
-            warnings.warn(f"{label} is constant ({low:g}); its height is taken as 0", BumpWarning, stacklevel=5)
+            warnings.warn(
+                f"{label} is constant ({low:g}); its height is taken as 0", BumpWarning, stacklevel=5
+            )
             return np.zeros(plane.shape, np.float32)
     else:
         if not hasattr(height_range, "__len__") or len(height_range) != 2:
@@ -441,8 +445,8 @@ def _stretch(plane: NDArray[Any], height_range: Any, label: str) -> NDArray[np.f
     if outside.any():
         row, column = _first(outside)
         warnings.warn(
-            f"{label}: {np.count_nonzero(outside)} heights outside height_range=({low:g}, {high:g}) were clipped, "
-            f"the first at row {row}, column {column}: {plane[row, column]}",
+            f"{label}: {np.count_nonzero(outside)} heights outside height_range=({low:g}, {high:g}) were "
+            f"clipped, the first at row {row}, column {column}: {plane[row, column]}",
             BumpWarning,
             stacklevel=5,
         )

@@ -192,9 +192,7 @@ def march(
             wanted,
         )
         return Hits(arrays, seconds)
-    arrays = _bumpwgpu.march(
-        height_map._field, starts, ways, chosen.name, parameters, wanted, from_surface
-    )
+    arrays = _bumpwgpu.march(height_map._field, starts, ways, chosen.name, parameters, wanted, from_surface)
     return Hits(arrays)
 
 

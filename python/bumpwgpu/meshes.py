@@ -285,7 +285,9 @@ class Mesh:
         >>> bool((abs((mesh.positions ** 2).sum(1) - 4) < 1e-5).all())
         True
         """
-        return Mesh._wrap(_bumpwgpu.Mesh.sphere(number("radius", radius), whole("segments", segments, 3, 2048)))
+        return Mesh._wrap(
+            _bumpwgpu.Mesh.sphere(number("radius", radius), whole("segments", segments, 3, 2048))
+        )
 
     @staticmethod
     def torus(

@@ -45,13 +45,17 @@ def _spectral(u: _Plane, v: _Plane, rng: np.random.Generator, slope: float) -> _
     Fournier, Fussell, Carpenter 1982; spectral synthesis as in Saupe 1988.
     """
     shape = (v.shape[0], u.shape[1])
-    frequency = np.hypot(np.fft.fftfreq(shape[0])[:, None] * shape[0], np.fft.rfftfreq(shape[1])[None] * shape[1])
+    frequency = np.hypot(
+        np.fft.fftfreq(shape[0])[:, None] * shape[0], np.fft.rfftfreq(shape[1])[None] * shape[1]
+    )
     frequency[0, 0] = np.inf
     # The lowest waves come from a table of fixed size, so a map keeps its look at other sizes.
     phases = rng.uniform(0.0, 2.0 * np.pi, (64, 64))
     rows = (np.fft.fftfreq(shape[0]) * shape[0]).astype(np.int64) % 64
     columns = np.arange(frequency.shape[1]) % 64
-    scrambled = phases[rows[:, None], columns[None]] * (1.0 + (frequency.clip(max=1e6).astype(np.int64) // 64))
+    scrambled = phases[rows[:, None], columns[None]] * (
+        1.0 + (frequency.clip(max=1e6).astype(np.int64) // 64)
+    )
     spectrum = frequency**-slope * np.exp(1j * scrambled)
     return _stretch(np.fft.irfft2(spectrum, s=shape))
 
@@ -202,7 +206,8 @@ def heights(name: str, size: int | tuple[int, int], seed: int) -> NDArray[np.flo
     limit = _bumpwgpu.MAX_SIDE
     if not (1 <= width <= limit and 1 <= height <= limit) or width * height > MAX_TEXELS:
         raise ValueError(
-            f"size is {width} x {height}; each side must be 1 to {limit}, and no more than {MAX_TEXELS} texels in all"
+            f"size is {width} x {height}; each side must be 1 to {limit}, "
+            f"and no more than {MAX_TEXELS} texels in all"
         )
     seed = whole("seed", seed)
     if seed < 0:

@@ -126,7 +126,9 @@ class Frame:
         Image.init()
         kind = Image.EXTENSION.get(target.suffix.lower())
         if kind is None or kind not in Image.SAVE:
-            raise ValueError(f"cannot write {target.name!r}: unknown image suffix {target.suffix!r}; use .png")
+            raise ValueError(
+                f"cannot write {target.name!r}: unknown image suffix {target.suffix!r}; use .png"
+            )
         image = self.to_pil()
         if kind in ("JPEG", "BMP", "PPM"):
             image = image.convert("RGB")
@@ -231,7 +233,9 @@ def render(
     chosen = get(technique)
     choice("device", device, ("auto", "gpu", "cpu"))
     if device == "cpu":
-        raise ValueError("render needs a Vulkan device: device='auto' or 'gpu'; Mesa's lavapipe is one in software")
+        raise ValueError(
+            "render needs a Vulkan device: device='auto' or 'gpu'; Mesa's lavapipe is one in software"
+        )
     outputs = strings("aovs", aovs, AOVS)
     width, height = _size(size)
     if camera is None:
@@ -242,7 +246,7 @@ def render(
     result = _bumpwgpu.render(
         [(mesh._core, first, end, used._core) for first, end, used in draws],
         (camera.eye, camera.target, camera.up, camera.fov_y),
-        [(light.kind == "directional", light.vector, light.color, light.intensity) for light in _lights(lights)],
+        [(lamp.kind == "directional", lamp.vector, lamp.color, lamp.intensity) for lamp in _lights(lights)],
         _ambient(ambient),
         _background(background),
         chosen.name,
@@ -252,7 +256,7 @@ def render(
         outputs,
     )
     texts = list(result["warnings"])
-    if chosen.name != "flat" and not any(used.height is not None or used.normal is not None for *_, used in draws):
+    if chosen.name != "flat" and all(used.height is None and used.normal is None for *_, used in draws):
         texts.append(f"technique {chosen.name!r} has no effect: the material has no height map")
     for text in texts:
         warnings.warn(text, BumpWarning, stacklevel=2)
@@ -285,19 +289,24 @@ def _draws(mesh: Mesh, material: Any) -> list[tuple[int, int, Material]]:
         if len(loaded) != len(mesh.materials):
             raise ValueError(f"{len(loaded)} materials given, but the mesh has {len(mesh.materials)}")
     else:
-        raise TypeError(f"material must be a Material, a sequence of them or None, got {type(material).__name__}")
+        raise TypeError(
+            f"material must be a Material, a sequence of them or None, got {type(material).__name__}"
+        )
     plain = Material()
     return [
-        (part.triangles.start, part.triangles.stop, plain if part.material is None else loaded[part.material])
+        (
+            part.triangles.start,
+            part.triangles.stop,
+            loaded[part.material] if part.material is not None else plain,
+        )
         for part in mesh.parts
     ]
 
 
 def _front(mesh: Mesh, aspect: float) -> Camera:
     """A camera that sees the whole mesh from the front, a little from above."""
-    low, high = (np.array(corner, np.float64) for corner in mesh.bounds)
-    centre = (low + high) / 2.0
-    radius = max(float(np.linalg.norm(high - low)) / 2.0, 1e-6)
+    centre = np.mean(np.array(mesh.bounds, np.float64), axis=0)
+    radius = max(float(np.linalg.norm(mesh.positions - centre, axis=1).max()), 1e-6)
     fov_y = 40.0
     half = np.radians(fov_y / 2.0)
     narrow = min(half, np.arctan(np.tan(half) * aspect))

@@ -64,7 +64,16 @@ class Material:
     0.3
     """
 
-    __slots__ = ("_albedo", "_core", "_double_sided", "_factor", "_height", "_normal", "_shininess", "_specular")
+    __slots__ = (
+        "_albedo",
+        "_core",
+        "_double_sided",
+        "_factor",
+        "_height",
+        "_normal",
+        "_shininess",
+        "_specular",
+    )
     _height: HeightMap | None
     _albedo: NDArray[np.uint8] | None
     _normal: NDArray[np.float32] | None
@@ -110,7 +119,9 @@ class Material:
         )
 
     @classmethod
-    def _scaled(cls, normal_scale: float, factor: tuple[float, float, float, float], **given: Any) -> Material:
+    def _scaled(
+        cls, normal_scale: float, factor: tuple[float, float, float, float], **given: Any
+    ) -> Material:
         """A material whose normal map is scaled and whose albedo is multiplied, as mesh files ask."""
         made = cls(**given)
         made._factor = factor
@@ -348,9 +359,7 @@ class Light:
         settle(self, "intensity", number("intensity", self.intensity, 0.0))
 
     @staticmethod
-    def directional(
-        direction: Vector, color: Vector = (1.0, 1.0, 1.0), intensity: float = 1.0
-    ) -> Light:
+    def directional(direction: Vector, color: Vector = (1.0, 1.0, 1.0), intensity: float = 1.0) -> Light:
         """Light from far away, such as the sun.
 
         Parameters

@@ -76,14 +76,6 @@ class Technique:
         """Parameter values by name."""
         return {spec.name: value for spec, value in zip(self.PARAMETERS, self._values, strict=True)}
 
-    def __getattr__(self, name: str) -> int:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        for spec, value in zip(type(self).PARAMETERS, self._values, strict=True):
-            if spec.name == name:
-                return value
-        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"{type(self).__name__} is immutable; make a new one to change {name!r}")
 
@@ -101,9 +93,6 @@ class Technique:
 
     def __hash__(self) -> int:
         return hash((self.name, self._values))
-
-    def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *(spec.name for spec in self.PARAMETERS)]
 
     def __reduce__(self) -> tuple[Any, ...]:
         return (_restore, (self.name, self.parameters))
@@ -137,29 +126,38 @@ def _make(entry: dict[str, Any]) -> type[Technique]:
     for spec in specs:
         lines.append(f"{spec.name} : int, default {spec.default}")
         lines.append(f"    {spec.summary} {spec.min} to {spec.max}.")
-    return type(
-        _class_name(entry["name"]),
-        (Technique,),
-        {
-            "__slots__": (),
-            "__module__": __name__,
-            "__doc__": "\n".join(lines),
-            "__signature__": inspect.Signature(
-                [
-                    inspect.Parameter(
-                        spec.name, inspect.Parameter.KEYWORD_ONLY, default=spec.default, annotation=int
-                    )
-                    for spec in specs
-                ]
-            ),
-            "name": entry["name"],
-            "summary": entry["summary"],
-            "source": entry["source"],
-            "casts_shadows": entry["casts_shadows"],
-            "marches": entry["marches"],
-            "PARAMETERS": specs,
-        },
-    )
+    members: dict[str, Any] = {
+        "__slots__": (),
+        "__module__": __name__,
+        "__doc__": "\n".join(lines),
+        "__init__": _initializer(specs),
+        "name": entry["name"],
+        "summary": entry["summary"],
+        "source": entry["source"],
+        "casts_shadows": entry["casts_shadows"],
+        "marches": entry["marches"],
+        "PARAMETERS": specs,
+    }
+    for at, spec in enumerate(specs):
+        members[spec.name] = _parameter(at, spec)
+    return type(_class_name(entry["name"]), (Technique,), members)
+
+
+def _initializer(specs: tuple[Parameter, ...]) -> Any:
+    """``__init__`` that shows its parameters to ``help`` and to type checkers."""
+
+    def __init__(self: Technique, **parameters: int) -> None:
+        Technique.__init__(self, **parameters)
+
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    shown = [inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD)]
+    shown += [inspect.Parameter(spec.name, keyword, default=spec.default, annotation=int) for spec in specs]
+    __init__.__signature__ = inspect.Signature(shown)  # type: ignore[attr-defined]
+    return __init__
+
+
+def _parameter(at: int, spec: Parameter) -> property:
+    return property(lambda self: self._values[at], doc=spec.summary)
 
 
 _CLASSES: dict[str, type[Technique]] = {entry["name"]: _make(entry) for entry in _bumpwgpu.techniques()}

@@ -2,6 +2,28 @@
 
 from typing import Any, ClassVar, NamedTuple
 
+__all__ = [
+    "Binary",
+    "Bump",
+    "Dot3",
+    "Exact",
+    "Flat",
+    "Interval",
+    "Normal",
+    "Parallax",
+    "ParallaxLimited",
+    "Parameter",
+    "Pom",
+    "Relief",
+    "Steep",
+    "SteepExponential",
+    "SteepLinear",
+    "Technique",
+    "get",
+    "marching",
+    "names",
+]
+
 class Parameter(NamedTuple):
     name: str
     summary: str
@@ -23,7 +45,6 @@ class Technique:
     def __hash__(self) -> int: ...
     def __setattr__(self, name: str, value: object) -> None: ...
     def __delattr__(self, name: str) -> None: ...
-    def __dir__(self) -> list[str]: ...
     def __reduce__(self) -> tuple[Any, ...]: ...
 
 class Flat(Technique):

@@ -1,0 +1,581 @@
+"""The command line: ``bumpwgpu bake | render | compare | info``."""
+
+from __future__ import annotations
+
+import json
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from . import __version__, techniques
+from .baking import MAPS
+from .baking import bake as bake_maps
+from .compare import ELEVATIONS, Scene
+from .compare import compare as compare_techniques
+from .errors import BumpError
+from .heightmap import HeightMap
+from .meshes import Mesh
+from .rendering import AOVS
+from .rendering import render as render_frame
+from .scene import Camera, Light, Material
+from .system import info as system_info
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    name="bumpwgpu",
+    help="Bake, render and compare surface detail from height maps.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+_MESHES: dict[str, Callable[[], Mesh]] = {
+    "quad": Mesh.quad,
+    "cube": Mesh.cube,
+    "sphere": Mesh.sphere,
+    "torus": Mesh.torus,
+}
+_MESH_SUFFIXES = (".obj", ".gltf", ".glb")
+_T = TypeVar("_T")
+
+
+class WrapChoice(Enum):
+    """Values of --wrap."""
+
+    REPEAT = "repeat"
+    CLAMP = "clamp"
+    MIRROR = "mirror"
+
+
+class KernelChoice(Enum):
+    """Values of --kernel."""
+
+    FORWARD = "forward"
+    CENTRAL = "central"
+    SOBEL3 = "sobel3"
+    SOBEL5 = "sobel5"
+    SCHARR = "scharr"
+    PREWITT = "prewitt"
+    BILINEAR = "bilinear"
+
+
+class ConventionChoice(Enum):
+    """Values of --convention."""
+
+    OPENGL = "opengl"
+    DIRECTX = "directx"
+
+
+class FormatChoice(Enum):
+    """Values of --format."""
+
+    PNG = "png"
+    EXR = "exr"
+    NPY = "npy"
+
+
+class BitsChoice(Enum):
+    """Values of --bits."""
+
+    EIGHT = "8"
+    SIXTEEN = "16"
+
+
+class DeviceChoice(Enum):
+    """Values of --device."""
+
+    AUTO = "auto"
+    CPU = "cpu"
+    GPU = "gpu"
+
+
+# Options that several commands share.
+_Scale = Annotated[float, typer.Option(help="Height range, mesh units.", min=0.0)]
+_Base = Annotated[
+    float, typer.Option(help="Height that lies on the mesh: 1 carves in, 0 raises.", min=0.0, max=1.0)
+]
+_Tile = Annotated[tuple[float, float], typer.Option(help="Mesh units covered by one tile along u and v.")]
+_WrapOption = Annotated[WrapChoice, typer.Option(help="What lies beyond the edge.")]
+_Channel = Annotated[
+    str | None, typer.Option(help="Channel with the heights: r, g, b, a, an index, or an EXR name.")
+]
+_Invert = Annotated[bool, typer.Option("--invert", help="The map holds depth: 1 is low.")]
+_Range = Annotated[
+    str | None,
+    typer.Option(help="What becomes height 0 and 1: 'auto' or 'low,high', in the units of the data."),
+]
+_Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON and nothing else.")]
+_Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Print errors only.")]
+_Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print more; on errors, a traceback.")]
+
+
+class _Output:
+    """Where results, warnings and progress go: results to stdout, all else to stderr."""
+
+    def __init__(self, json_wanted: bool, quiet: bool, verbose: bool) -> None:
+        self.json = json_wanted
+        self.quiet = quiet
+        self.verbose = verbose
+        self.out = Console(soft_wrap=True, highlight=False)
+        self.err = Console(stderr=True, soft_wrap=True, highlight=False)
+
+    def say(self, text: str) -> None:
+        if not (self.json or self.quiet):
+            self.out.print(text, markup=False)
+
+    def show(self, table: Table) -> None:
+        if not (self.json or self.quiet):
+            self.out.print(table)
+
+    def result(self, data: dict[str, Any]) -> None:
+        if self.json:
+            sys.stdout.write(json.dumps(data, indent=1, allow_nan=False, default=str) + "\n")
+
+    def warn(self, text: str) -> None:
+        if not self.quiet:
+            self.err.print(f"warning: {text}", markup=False)
+
+    @contextmanager
+    def progress(self, text: str) -> Iterator[Callable[..., None]]:
+        """A progress bar on stderr, for people only: none with -q or where stderr is no terminal."""
+        bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TaskProgressColumn(),
+            TimeElapsedColumn(),
+            console=self.err,
+            transient=True,
+            disable=self.quiet or not self.err.is_terminal,
+        )
+        with bar:
+            task = bar.add_task(text, total=None)
+
+            def advance(done: int, total: int, now: str = text) -> None:
+                bar.update(task, completed=done, total=total, description=now)
+
+            yield advance
+
+
+@contextmanager
+def _session(json_wanted: bool, quiet: bool, verbose: bool) -> Iterator[_Output]:
+    """Turns warnings into lines and exceptions into one line and an exit code."""
+    output = _Output(json_wanted, quiet, verbose)
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        warnings.showwarning = lambda message, *_args, **_kwargs: output.warn(str(message))
+        try:
+            yield output
+        except KeyboardInterrupt:
+            output.err.print("interrupted", markup=False)
+            raise typer.Exit(130) from None
+        except (BumpError, OSError, ValueError, TypeError, MemoryError) as error:
+            if verbose:
+                output.err.print_exception()
+            lines = str(error).split("\n")
+            output.err.print(f"error: {lines[0] or type(error).__name__}", markup=False)
+            raise typer.Exit(1) from None
+
+
+def _usage(check: Callable[..., _T], *arguments: Any, **options: Any) -> _T:
+    """Calls a check of options; what it finds wrong is a usage error."""
+    try:
+        return check(*arguments, **options)
+    except (ValueError, TypeError) as error:
+        raise typer.BadParameter(str(error)) from None
+
+
+def _names(text: str, known: tuple[str, ...], what: str) -> list[str]:
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    for name in names:
+        if name not in known:
+            raise typer.BadParameter(f"unknown {what} {name!r}; known: {', '.join(known)}")
+    return names
+
+
+def _numbers(text: str, what: str, count: int | None = None) -> tuple[float, ...]:
+    try:
+        values = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise typer.BadParameter(f"{what} must be numbers with commas between, got {text!r}") from None
+    if count is not None and len(values) != count:
+        raise typer.BadParameter(f"{what} must be {count} numbers with commas between, got {text!r}")
+    return values
+
+
+def _technique(text: str) -> techniques.Technique:
+    """``relief`` or ``relief(linear=16, refine=4)``."""
+    name, bracket, rest = text.strip().partition("(")
+    chosen = _usage(techniques.get, name.strip())
+    if not bracket:
+        return chosen
+    parameters: dict[str, int] = {}
+    for part in rest.rstrip().removesuffix(")").split(","):
+        key, _, value = part.partition("=")
+        try:
+            parameters[key.strip()] = int(value)
+        except ValueError:
+            raise typer.BadParameter(f"technique {text!r}: write {name}(parameter=number)") from None
+    return _usage(type(chosen), **parameters)
+
+
+def _techniques(text: str) -> list[techniques.Technique]:
+    """Several of the above; commas inside brackets belong to the parameters."""
+    parts, depth = [""], 0
+    for letter in text:
+        depth += {"(": 1, ")": -1}.get(letter, 0)
+        if letter == "," and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += letter
+    return [_technique(part) for part in parts if part.strip()]
+
+
+def _channel(text: str | None) -> int | str | None:
+    return int(text) if text is not None and text.isdigit() else text
+
+
+def _range(text: str | None) -> Any:
+    return text if text in (None, "auto") else _numbers(text, "--height-range", 2)
+
+
+def _check_suffix(path: Path, known: tuple[str, ...]) -> None:
+    if path.suffix.lower() not in known:
+        raise typer.BadParameter(f"{path.name!r} must end in one of {', '.join(known)}")
+
+
+@app.command()
+def bake(
+    source: Annotated[Path, typer.Argument(help="Height map: PNG, TIFF, EXR, JPEG, WebP, BMP, TGA or npy.")],
+    maps: Annotated[
+        str, typer.Option(help=f"Maps to bake, with commas between: {', '.join(MAPS)}.")
+    ] = "normal",
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the maps.")] = Path("maps"),
+    kernel: Annotated[
+        KernelChoice, typer.Option(help="How slopes are taken from texels.")
+    ] = KernelChoice.SOBEL3,
+    convention: Annotated[
+        ConventionChoice, typer.Option(help="Whether green points up or down.")
+    ] = ConventionChoice.OPENGL,
+    format: Annotated[FormatChoice, typer.Option(help="File format.")] = FormatChoice.PNG,
+    bits: Annotated[BitsChoice | None, typer.Option(help="Bits a channel of a PNG.")] = None,
+    prefix: Annotated[str, typer.Option(help="First part of the file names.")] = "",
+    scale: _Scale = 0.1,
+    base: _Base = 1.0,
+    tile_size: _Tile = (1.0, 1.0),
+    wrap: _WrapOption = WrapChoice.REPEAT,
+    channel: _Channel = None,
+    invert: _Invert = False,
+    height_range: _Range = None,
+    json_output: _Json = False,
+    quiet: _Quiet = False,
+    verbose: _Verbose = False,
+) -> None:
+    """Make normal maps, relief maps and pyramids from a height map."""
+    wanted = _names(maps, MAPS, "map")
+    depth: Any = int(bits.value) if bits is not None else None
+    span = _range(height_range)
+    with _session(json_output, quiet, verbose) as out:
+        heights = HeightMap(
+            source,
+            scale=scale,
+            base=base,
+            tile_size=tile_size,
+            wrap=wrap.value,
+            channel=_channel(channel),
+            invert=invert,
+            height_range=span,
+        )
+        with out.progress("baking") as advance:
+            made = bake_maps(
+                heights, wanted, kernel=kernel.value, convention=convention.value, progress=advance
+            )
+        paths = made.save(output, format=format.value, bits=depth, prefix=prefix)
+        if verbose:
+            out.say(repr(heights))
+        for path in paths:
+            out.say(str(path))
+        rows, columns = heights.shape
+        out.result(
+            {"source": str(source), "width": columns, "height": rows, "bits": heights.bits, "files": paths}
+        )
+
+
+@app.command()
+def render(
+    source: Annotated[
+        Path | None, typer.Argument(help="Height map, or a mesh file with its own materials.")
+    ] = None,
+    mesh: Annotated[
+        str, typer.Option(help="quad, cube, sphere, torus, or a file: OBJ, glTF, GLB.", show_default="quad")
+    ] = "",
+    technique: Annotated[
+        str, typer.Option(help="For example relief or 'relief(linear=16,refine=8)'.")
+    ] = "relief",
+    output: Annotated[Path, typer.Option("-o", "--output", help="The picture.")] = Path("render.png"),
+    albedo: Annotated[Path | None, typer.Option(help="Colour image, sRGB.")] = None,
+    normal: Annotated[Path | None, typer.Option(help="Normal map, +Y up.")] = None,
+    specular: Annotated[float, typer.Option(help="Strength of the highlight.", min=0.0, max=1.0)] = 0.3,
+    shininess: Annotated[float, typer.Option(help="Exponent of the highlight.", min=1.0, max=10000.0)] = 32.0,
+    size: Annotated[tuple[int, int], typer.Option(help="Width and height, pixels.", min=1)] = (512, 512),
+    eye: Annotated[str | None, typer.Option(help="Where the camera is: x,y,z.")] = None,
+    target: Annotated[str, typer.Option(help="What it looks at: x,y,z.")] = "0,0,0",
+    fov_y: Annotated[float, typer.Option(help="Vertical field of view, degrees.", min=0.1, max=179.0)] = 45.0,
+    light: Annotated[
+        list[str] | None, typer.Option(help="Direction a light travels in: x,y,z. May be given again.")
+    ] = None,
+    shadows: Annotated[
+        bool | None, typer.Option(help="Self-shadowing.", show_default="where the technique can")
+    ] = None,
+    aovs: Annotated[
+        str, typer.Option(help=f"Further outputs, as npy beside the picture: {', '.join(AOVS)}.")
+    ] = "",
+    scale: _Scale = 0.1,
+    base: _Base = 1.0,
+    tile_size: _Tile = (1.0, 1.0),
+    wrap: _WrapOption = WrapChoice.REPEAT,
+    channel: _Channel = None,
+    invert: _Invert = False,
+    height_range: _Range = None,
+    json_output: _Json = False,
+    quiet: _Quiet = False,
+    verbose: _Verbose = False,
+) -> None:
+    """Draw a mesh with a relief. Needs a Vulkan device; Mesa's lavapipe is one in software."""
+    chosen = _technique(technique)
+    outputs = _names(aovs, AOVS, "output")
+    span = _range(height_range)
+    camera = None
+    if eye is not None:
+        camera = _usage(
+            Camera.look_at, _numbers(eye, "--eye", 3), _numbers(target, "--target", 3), fov_y=fov_y
+        )
+    lights = [_usage(Light.directional, _numbers(part, "--light", 3)) for part in light or []]
+    own = source is not None and source.suffix.lower() in _MESH_SUFFIXES
+    if own and mesh:
+        raise typer.BadParameter("SOURCE is a mesh already; give --mesh a mesh only with a height map")
+    if source is None and not mesh:
+        raise typer.BadParameter("nothing to draw: give a height map, a mesh file, or --mesh")
+    with _session(json_output, quiet, verbose) as out:
+        shape = _open_mesh(str(source) if own else mesh or "quad")
+        heights = None
+        if source is not None and not own:
+            heights = HeightMap(
+                source,
+                scale=scale,
+                base=base,
+                tile_size=tile_size,
+                wrap=wrap.value,
+                channel=_channel(channel),
+                invert=invert,
+                height_range=span,
+            )
+        material = None
+        if heights is not None or albedo is not None or normal is not None:
+            material = Material(
+                height=heights, albedo=albedo, normal=normal, specular=specular, shininess=shininess
+            )
+        with out.progress("rendering"):
+            frame = render_frame(
+                shape,
+                material,
+                camera=camera,
+                lights=lights or None,
+                technique=chosen,
+                size=size,
+                shadows=shadows,
+                aovs=outputs,
+            )
+        files = [frame.save(output), *_save_aovs(frame.aovs, output)]
+        for path in files:
+            out.say(str(path))
+        if verbose:
+            out.say(", ".join(f"{name} {value}" for name, value in frame.stats.items()))
+        out.result({"technique": repr(chosen), "files": files, "stats": frame.stats})
+
+
+def _open_mesh(name: str) -> Mesh:
+    return _MESHES[name]() if name in _MESHES else Mesh.open(name)
+
+
+def _save_aovs(aovs: dict[str, Any], output: Path) -> list[Path]:
+    from io import BytesIO
+
+    import numpy as np
+
+    from ._atomic import replace_file
+
+    made = []
+    for name, values in aovs.items():
+        data = BytesIO()
+        np.save(data, values, allow_pickle=False)
+        made.append(replace_file(output.with_name(f"{output.stem}_{name}.npy"), data.getvalue()))
+    return made
+
+
+@app.command()
+def compare(
+    source: Annotated[Path, typer.Argument(help="Height map.")],
+    technique_list: Annotated[
+        str,
+        typer.Option(
+            "--techniques", help="Which, with commas between.", show_default="all, over step counts"
+        ),
+    ] = "",
+    elevations: Annotated[str, typer.Option(help="View angles above the surface, degrees.")] = ",".join(
+        f"{angle:g}" for angle in ELEVATIONS
+    ),
+    device: Annotated[
+        DeviceChoice, typer.Option(help="Whose time to take besides the CPU's.")
+    ] = DeviceChoice.AUTO,
+    max_error: Annotated[float, typer.Option(help="Error budget: texels at p99.", min=0.0)] = 0.5,
+    rays: Annotated[int, typer.Option(help="Rays at each elevation.", min=1)] = 8192,
+    repeats: Annotated[int, typer.Option(help="Timed repeats.", min=1)] = 5,
+    seed: Annotated[int, typer.Option(help="Fixes the rays.", min=0)] = 0,
+    mesh: Annotated[
+        str, typer.Option(help="Compare on this mesh: quad, cube, sphere, torus or a file. Needs a device.")
+    ] = "",
+    eye: Annotated[str, typer.Option(help="With --mesh: where the camera is, x,y,z.")] = "0,-1.2,0.8",
+    target: Annotated[str, typer.Option(help="With --mesh: what it looks at.")] = "0,0,0",
+    size: Annotated[tuple[int, int], typer.Option(help="With --mesh: width and height, pixels.", min=1)] = (
+        512,
+        512,
+    ),
+    report: Annotated[Path | None, typer.Option(help="Write an HTML page.")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Write a plot (.png, .svg, .pdf); needs matplotlib.")
+    ] = None,
+    rows: Annotated[Path | None, typer.Option(help="Write all rows as JSON.")] = None,
+    scale: _Scale = 0.1,
+    base: _Base = 1.0,
+    tile_size: _Tile = (1.0, 1.0),
+    wrap: _WrapOption = WrapChoice.REPEAT,
+    channel: _Channel = None,
+    invert: _Invert = False,
+    height_range: _Range = None,
+    json_output: _Json = False,
+    quiet: _Quiet = False,
+    verbose: _Verbose = False,
+) -> None:
+    """Measure what each technique costs and how wrong it is, and recommend one."""
+    chosen = _techniques(technique_list) or None
+    angles = _numbers(elevations, "--elevations")
+    if not all(0.0 < angle <= 90.0 for angle in angles):
+        raise typer.BadParameter(f"--elevations must be above 0 and at most 90 degrees, got {elevations}")
+    span = _range(height_range)
+    camera = _usage(Camera.look_at, _numbers(eye, "--eye", 3), _numbers(target, "--target", 3))
+    if plot is not None:
+        _check_suffix(plot, (".png", ".svg", ".pdf"))
+    with _session(json_output, quiet, verbose) as out:
+        heights = HeightMap(
+            source,
+            scale=scale,
+            base=base,
+            tile_size=tile_size,
+            wrap=wrap.value,
+            channel=_channel(channel),
+            invert=invert,
+            height_range=span,
+        )
+        subject: HeightMap | Scene = heights
+        if mesh:
+            light = Light.directional((-0.6, -0.7, -0.9))
+            subject = Scene(_open_mesh(mesh), Material(height=heights), camera, (light,), size)
+        with out.progress("comparing") as advance:
+            result = compare_techniques(
+                subject,
+                chosen,
+                elevations=angles,
+                device=device.value,
+                rays=rays,
+                repeats=repeats,
+                seed=seed,
+                progress=advance,
+            )
+        files = []
+        if report is not None:
+            files.append(result.report(report))
+        if plot is not None:
+            files.append(result.plot(plot))
+        if rows is not None:
+            files.append(result.to_json(rows))
+        advice = result.recommend(max_error)
+        listed = result.select("all") if verbose else result.pareto()
+        out.show(_table(listed, result.timed_on))
+        out.say(str(advice))
+        for path in files:
+            out.say(str(path))
+        out.result(
+            {
+                "recommendation": advice.technique,
+                "parameters": advice.parameters,
+                "error_p99_texels": advice.error_p99_texels,
+                "reason": advice.reason,
+                "timed_on": result.timed_on,
+                "pareto": [row["label"] for row in result.pareto()],
+                "rows": result.rows,
+                "files": files,
+            }
+        )
+
+
+def _table(rows: list[dict[str, Any]], timed_on: str) -> Table:
+    table = Table(title="time against error, all elevations")
+    table.add_column("technique")
+    for heading in (f"ns/ray ({timed_on})", "p99 texels", "max texels", "failing"):
+        table.add_column(heading, justify="right")
+    for row in rows:
+        errors = (row["uv_error_p99_texels"], row["uv_error_max_texels"])
+        table.add_row(
+            row["label"],
+            f"{row[f'time_{timed_on}_ns_per_ray']:.1f}",
+            *("-" if error is None else f"{error:.3g}" for error in errors),
+            f"{row['failure_rate']:.2%}",
+        )
+    return table
+
+
+@app.command()
+def info(json_output: _Json = False, quiet: _Quiet = False, verbose: _Verbose = False) -> None:
+    """Show versions, Vulkan devices and the processor."""
+    with _session(json_output, quiet, verbose) as out:
+        found = system_info()
+        out.say(f"bumpwgpu {found['version']}, Python {found['python']}, NumPy {found['numpy']}")
+        out.say(f"{found['platform']}, {found['threads']} threads, {found['simd']}")
+        for adapter in found["adapters"]:
+            out.say(f"{adapter['name']} ({adapter['kind']}; {adapter['driver_info']})")
+        if not found["adapters"]:
+            out.say("no Vulkan device: bake, march and compare work, render does not")
+        if verbose:
+            out.say(f"techniques: {', '.join(found['techniques'])}")
+        out.result(found)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        sys.stdout.write(f"bumpwgpu {__version__}\n")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Bake, render and compare surface detail from height maps."""
+
+
+def main() -> None:
+    """Entry point of the command ``bumpwgpu``."""
+    app()
