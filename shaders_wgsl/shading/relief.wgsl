@@ -16,6 +16,10 @@ struct ReliefTargets {
     @builtin(frag_depth) depth: f32,
 }
 
+// Shadow rays start this much above the hit, in heights: one step of a 16-bit map. What is left of
+// rounding in the hit then cannot put them below the surface of the next cell.
+const SHADOW_LIFT: f32 = 1.0 / 65536.0;
+
 // `position`: of the mesh surface, object space; `point.uv`: there.
 fn shade_relief(position: vec3f, point: SurfacePoint) -> ReliefTargets {
     let direction = position - draw.eye.xyz;
@@ -30,7 +34,7 @@ fn shade_relief(position: vec3f, point: SurfacePoint) -> ReliefTargets {
     let normal = world_normal(shading_normal(at_hit));
     let albedo = albedo_at(hit.xy, point.uv_dx, point.uv_dy);
     let relative = relative_position(hit_position);
-    let light = lit(albedo.rgb, relative, normal, ShadowPoint(point.surface, hit));
+    let light = lit(albedo.rgb, relative, normal, ShadowPoint(point.surface, hit + vec3f(0.0, 0.0, SHADOW_LIFT)));
 
     let depth = dot(relative, frame.forward.xyz);
     var out: ReliefTargets;

@@ -1,0 +1,61 @@
+//! Host structs against naga's layout of their WGSL twins, and programs against what the host binds.
+
+use std::mem::offset_of;
+
+use render::uniforms::{DrawInfo, FrameInfo, HeightInfo, LightInfo, MarchResult, MarchSegment, MaterialInfo};
+use shaders::{Field, Layout};
+
+macro_rules! layout {
+    ($type:ty: $($field:ident),* $(,)?) => {
+        Layout {
+            fields: vec![$(Field {
+                name: stringify!($field).to_owned(),
+                offset: offset_of!($type, $field) as u32,
+                size: {
+                    let blank: $type = bytemuck::Zeroable::zeroed();
+                    size_of_val(&blank.$field) as u32
+                },
+            },)*],
+            size: size_of::<$type>() as u32,
+        }
+    };
+}
+
+fn check(host: Layout, source: &str, name: &str) {
+    let theirs = shaders::layout_of(source, name).unwrap();
+    assert_eq!(host.fields, theirs.fields, "{name}");
+    // Arrays of structs and uniforms both go by the rounded size.
+    assert_eq!(host.size, theirs.size, "size of {name}");
+}
+
+#[test]
+fn host_structs_match() {
+    let relief = shaders::compose("relief", Some("relief"), Some("normal")).unwrap();
+    check(
+        layout!(FrameInfo: clip_from_relative, forward, ambient, light_count, pad_0, pad_1, pad_2),
+        &relief,
+        "FrameInfo",
+    );
+    check(layout!(LightInfo: place, color), &relief, "Light");
+    check(layout!(DrawInfo: relative_from_object, object_from_relative, eye), &relief, "DrawInfo");
+    check(
+        layout!(MaterialInfo: albedo_factor, map_width, map_height, scale, base, specular, shininess, period, wrap),
+        &relief,
+        "MaterialInfo",
+    );
+    check(
+        layout!(HeightInfo: size, base, scale, tile_size, wrap, level_count, cells, first_texel, highest, levels),
+        &relief,
+        "HeightInfo",
+    );
+    let march = shaders::compose("kernels/march", Some("exact"), None).unwrap();
+    check(layout!(MarchSegment: start, cos_theta, delta, unused), &march, "MarchSegment");
+    check(layout!(MarchResult: tau, status, steps, unused), &march, "MarchResult");
+}
+
+#[test]
+#[should_panic(expected = "MarchResult")]
+fn a_wrong_order_is_noticed() {
+    let march = shaders::compose("kernels/march", Some("exact"), None).unwrap();
+    check(layout!(MarchResult: status, tau, steps, unused), &march, "MarchResult");
+}
