@@ -55,7 +55,7 @@ def compare_scene(
     from .compare import CompareResult, Picture, label, machine
 
     if device == "cpu":
-        raise ValueError("a scene is compared by rendering it, which needs a Vulkan device: device='auto' or 'gpu'")
+        raise ValueError("comparing a scene renders it, which needs a Vulkan device: device='auto' or 'gpu'")
     settings = chosen or [_techniques.get(name) for name in _techniques.names()]
     total = 1 + len(settings) * (1 + repeats)
     tell = _teller(progress, total)
@@ -64,7 +64,7 @@ def compare_scene(
     has_flip = _has_flip()
     rows: list[Row] = []
     exact = _techniques.get("exact")
-    picture, check, _ = _measure(scene, exact, truth, has_flip)
+    picture, check, _ = _measure(scene, exact, truth, False)
     pictures = [Picture("exact", *picture)]
     for technique in settings:
         tell(f"errors of {technique!r}")
@@ -76,16 +76,19 @@ def compare_scene(
         rows += [{**start, "elevation": angle, **part} for angle, part in by_angle]
         rows.append({**start, "elevation": "all", **metrics})
     times: dict[str, list[float]] = {row["label"]: [] for row in rows}
+    left_out: dict[str, None] = {}
     for turn in range(1, repeats + 1):
         for technique in settings:
             tell(f"timing {technique!r}, round {turn} of {repeats}")
-            times[label(technique.name, technique.parameters)].append(_shoot(scene, technique).stats["draw_ms"])
+            frame = _shoot(scene, technique)
+            times[label(technique.name, technique.parameters)].append(frame.stats["draw_ms"])
+            left_out.update(dict.fromkeys(frame.warnings))
     tell("done")
     count = int(truth.pixels.sum())
     rows = [{**row, **_times(times[row["label"]], count)} for row in rows]
     _check_exact(check)
     environment = {
-        **machine(),
+        **machine(True),
         "map": repr(scene.material.height),
         "mesh": repr(scene.mesh),
         "picture": f"{scene.size[0]} x {scene.size[1]}, {count} pixels compared",
@@ -94,6 +97,7 @@ def compare_scene(
             key: check[key]
             for key in ("rays", "uv_error_p99_texels", "uv_error_max_texels", "miss_rate", "false_hit_rate")
         },
+        "left out": list(left_out),
         "time": "drawing a frame, shading and shadows included, over the pixels compared",
     }
     return CompareResult(rows, "scene", environment, scene, pictures)
@@ -125,16 +129,20 @@ def _has_flip() -> bool:
 
 
 def _shoot(scene: Scene, technique: Technique, aovs: tuple[str, ...] = ()) -> Frame:
-    return render(
-        scene.mesh,
-        scene.material,
-        camera=scene.camera,
-        lights=scene.lights or None,
-        technique=technique,
-        size=scene.size,
-        shadows=None if scene.shadows else False,
-        aovs=aovs,
-    )
+    # A comparison tries techniques on lights and materials that are not made for them; what each of
+    # them leaves out is stated once, in the environment.
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", BumpWarning)
+        return render(
+            scene.mesh,
+            scene.material,
+            camera=scene.camera,
+            lights=scene.lights or None,
+            technique=technique,
+            size=scene.size,
+            shadows=None if scene.shadows else False,
+            aovs=aovs,
+        )
 
 
 def _truth(scene: Scene, angles: list[float]) -> _Truth:
@@ -207,14 +215,16 @@ def _complete(metrics: Row, frame: Frame, truth: _Truth, chosen: NDArray[np.bool
 def _angle_deg(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     """Angles between unit vectors, sharp for small ones too."""
     distance, total = np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1)
-    return np.degrees(2.0 * np.arctan2(distance, total))
+    angles: NDArray[np.float64] = np.degrees(2.0 * np.arctan2(distance, total))
+    return angles
 
 
 def _picture_metrics(exact: Frame, frame: Frame, has_flip: bool) -> dict[str, float | None]:
     decibel = psnr(exact.color, frame.color)
+    equal = math.isinf(decibel)
     return {
-        "flip_mean": flip(exact.color, frame.color)[0] if has_flip else None,
-        "psnr_db": decibel if math.isfinite(decibel) else None,
+        "flip_mean": None if not has_flip else 0.0 if equal else flip(exact.color, frame.color)[0],
+        "psnr_db": None if equal else decibel,
         "ssim": ssim(exact.color, frame.color),
     }
 
@@ -239,8 +249,8 @@ def _check_exact(metrics: Row) -> None:
     error, missed = metrics["uv_error_p99_texels"], metrics["miss_rate"]
     if error > EXACT_TOLERANCE_TEXELS or missed > 0.0:
         warnings.warn(
-            f"the exact picture is off the reference in double precision by {error:.3g} texels at p99 and misses "
-            f"{100.0 * missed:.3g} % of pixels; expected at most {EXACT_TOLERANCE_TEXELS:g} and none",
+            f"the exact picture is off the reference in double precision by {error:.3g} texels at p99 and "
+            f"misses {100.0 * missed:.3g} % of pixels; expected at most {EXACT_TOLERANCE_TEXELS:g} and none",
             BumpWarning,
             stacklevel=4,
         )

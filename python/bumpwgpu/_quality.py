@@ -51,7 +51,7 @@ def ssim(reference: NDArray[np.uint8], test: NDArray[np.uint8]) -> float:
 def _blur(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Gaussian mean around every pixel whose window lies inside."""
     if min(values.shape) <= 2 * _RADIUS:
-        return values.mean(keepdims=True)
+        return np.full((1, 1), values.mean())
     offsets = np.arange(-_RADIUS, _RADIUS + 1)
     kernel = np.exp(-0.5 * (offsets / _SIGMA) ** 2)
     kernel /= kernel.sum()

@@ -87,7 +87,8 @@ def _axes(x: _Scale, y: _Scale, unit: str) -> list[str]:
         f"time, ns a {unit}</text>"
     )
     parts.append(
-        f'<text transform="translate(14 {middle:g}) rotate(-90)" text-anchor="middle">p99 hit error, texels</text>'
+        f'<text transform="translate(14 {middle:g}) rotate(-90)" text-anchor="middle">'
+        "p99 hit error, texels</text>"
     )
     return parts
 
@@ -113,7 +114,7 @@ def _marker(p: Point, color: str, x: _Scale, y: _Scale, unit: str) -> str:
     return (
         f"<g><title>{escape(title)}</title>"
         f'<path d="M{x(p.low_ns):.1f} {at_y:.1f}H{x(p.high_ns):.1f}" stroke="{color}" opacity="0.6"/>'
-        f'<circle cx="{at_x:.1f}" cy="{at_y:.1f}" r="{radius}" fill="{fill}" stroke="{edge}" stroke-width="1.5"/></g>'
+        f'<circle cx="{at_x:.1f}" cy="{at_y:.1f}" r="{radius}" fill="{fill}" stroke="{edge}"/></g>'
     )
 
 
@@ -134,6 +135,7 @@ def _labels(shown: list[Point], x: _Scale, y: _Scale) -> list[str]:
             )
         kind = "name" if p.on_front else "name faint"
         parts.append(
-            f'<text class="{kind}" x="{left + 2:.1f}" y="{base - 0.25 * size[1]:.1f}">{escape(short(p.label))}</text>'
+            f'<text class="{kind}" x="{left + 2:.1f}" y="{base - 0.25 * size[1]:.1f}">'
+            f"{escape(short(p.label))}</text>"
         )
     return parts

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import platform
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,10 +13,12 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _bumpwgpu, techniques as _techniques
+from . import _bumpwgpu
+from . import techniques as _techniques
 from ._atomic import replace_file
-from ._checks import choice, number, whole
+from ._checks import choice, flag, number, whole
 from .heightmap import HeightMap
+from .meshes import Mesh
 from .scene import Camera, Light, Material
 from .techniques import Technique
 
@@ -47,13 +50,13 @@ class Scene:
         Where it is seen from.
     lights : sequence of Light
         None at all is one directional light from the upper right.
-    size : (int, int), default (512, 512)
-        Columns and rows of the picture.
+    size : int or (int, int), default (512, 512)
+        Pixels: the side of a square, or (width, height).
     shadows : bool, default True
         Whether the relief casts shadows on itself.
     """
 
-    mesh: Any
+    mesh: Mesh
     material: Material
     camera: Camera
     lights: Sequence[Light] = ()
@@ -61,6 +64,8 @@ class Scene:
     shadows: bool = True
 
     def __post_init__(self) -> None:
+        if not isinstance(self.mesh, Mesh):
+            raise TypeError(f"mesh must be a Mesh, got {type(self.mesh).__name__}")
         if not isinstance(self.material, Material):
             raise TypeError(f"material must be a Material, got {type(self.material).__name__}")
         if self.material.height is None:
@@ -72,7 +77,8 @@ class Scene:
             if not isinstance(light, Light):
                 raise TypeError(f"lights must be Light objects, got {type(light).__name__}")
         object.__setattr__(self, "lights", lights)
-        object.__setattr__(self, "size", (int(self.size[0]), int(self.size[1])))
+        object.__setattr__(self, "size", _size(self.size))
+        flag("shadows", self.shadows)
 
 
 @dataclass(frozen=True)
@@ -228,7 +234,9 @@ class CompareResult:
             {
                 **rows[at],
                 "tied_with": [
-                    rows[other]["label"] for other in front if other != at and _tied(measured[at], measured[other])
+                    rows[other]["label"]
+                    for other in front
+                    if other != at and _tied(measured[at], measured[other])
                 ],
             }
             for at in front
@@ -287,7 +295,8 @@ class CompareResult:
         clock = self.timed_on if time is None else choice("time", time, ("cpu", "device"))
         keys = [f"time_{clock}_ns_per_ray{end}" for end in ("_low", "", "_high")]
         if any(row[key] is None for row in rows for key in keys):
-            raise ValueError(f"no {clock} time was measured; use time={'cpu' if clock == 'device' else 'device'!r}")
+            other = "cpu" if clock == "device" else "device"
+            raise ValueError(f"no {clock} time was measured; use time={other!r}")
         return rows, [
             (row["label"], [row[key] for key in keys], row["uv_error_p99_texels"], row["failure_rate"])
             for row in rows
@@ -494,7 +503,7 @@ def compare(
         row["label"] = label(row["technique"], row["parameters"])
         row["elevation"] = "all" if row["elevation"] is None else row["elevation"]
     environment = {
-        **machine(),
+        **machine(device != "cpu" and problem is None),
         "map": repr(source),
         "rays_per_elevation": count,
         "repeats": rounds,
@@ -503,6 +512,13 @@ def compare(
     if problem is not None:
         environment["device"] = f"none ({problem})"
     return CompareResult(rows, "planar", environment, source)
+
+
+def _size(size: Any) -> tuple[int, int]:
+    sides = tuple(size) if hasattr(size, "__len__") else (size, size)
+    if len(sides) != 2:
+        raise ValueError(f"size must be one number or (width, height), got {len(sides)} numbers")
+    return whole("size[0]", sides[0], 1, 1 << 16), whole("size[1]", sides[1], 1, 1 << 16)
 
 
 def _elevations(elevations: Any) -> list[float]:
@@ -535,11 +551,30 @@ def _chosen(techniques: Any) -> list[Technique]:
     return list(dict.fromkeys(_techniques.get(part) for part in parts))
 
 
-def machine() -> dict[str, Any]:
-    """Versions and device, for every comparison to state."""
-    from . import info
+def machine(uses_device: bool) -> dict[str, Any]:
+    """Device and versions, for every comparison to state."""
+    from .system import info
 
-    return dict(info())
+    found = info()
+    wanted = os.environ.get("BUMPWGPU_ADAPTER", "").lower()
+    device = next((known for known in found["adapters"] if wanted in known["name"].lower()), None)
+    stated = {"cpu": f"{_processor()}, {found['threads']} threads, {found['simd']}"}
+    if uses_device and device is not None:
+        driver = f"{device['driver']} {device['driver_info']}"
+        stated["device"] = f"{device['name']} ({device['kind']}), driver {driver}"
+    return {**stated, **{key: found[key] for key in ("version", "python", "numpy", "platform")}}
+
+
+def _processor() -> str:
+    """What the processor calls itself, where the system says."""
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as lines:
+            for line in lines:
+                if line.startswith("model name"):
+                    return line.split(":", 1)[1].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()
 
 
 def _planar_pictures(height_map: HeightMap, rows: list[Row]) -> list[Picture]:

@@ -44,7 +44,10 @@ def plot(result: CompareResult, path: str | os.PathLike[str]) -> Path:
     for axes in list(grid.flat)[len(panels) :]:
         axes.set_axis_off()
     where = "device" if result.timed_on == "device" else "CPU, all cores"
-    figure.suptitle(f"Time against error ({where}). Solid line: settings worth having; dashed: if skipped hits did not matter", fontsize=11)
+    figure.suptitle(
+        f"Time against error ({where}). Solid: settings worth having; dashed: if skipped hits did not matter",
+        fontsize=11,
+    )
     handles = [_marker(color, name) for name, color in palette.items()]
     handles.append(_marker("#999999", "skips hits (over 0.1 % of rays)", filled=False))
     figure.legend(handles=handles, loc="lower center", ncols=min(len(handles), 6), fontsize=8, frameon=False)
@@ -60,9 +63,15 @@ def _marker(color: str, name: str, filled: bool = True) -> Any:
     from matplotlib.lines import Line2D
 
     return Line2D(
-        [], [], linestyle="", marker="o", markersize=6, label=name, markeredgecolor=color,
+        [],
+        [],
+        linestyle="",
+        marker="o",
+        markersize=6,
+        label=name,
+        markeredgecolor=color,
         markerfacecolor=color if filled else "none",
-    )  # fmt: skip
+    )
 
 
 def _draw_panel(axes: Any, result: CompareResult, elevation: Any, palette: dict[str, str]) -> None:
@@ -77,27 +86,40 @@ def _draw_panel(axes: Any, result: CompareResult, elevation: Any, palette: dict[
     axes.plot([p.time_ns for p in front], [p.error_texels for p in front], color="#222222", linewidth=1.4)
     loose = sorted((p for p in shown if p.on_loose_front), key=lambda p: p.time_ns)
     axes.plot(
-        [p.time_ns for p in loose], [p.error_texels for p in loose], color="#777777", linewidth=0.9,
-        linestyle="--", zorder=1.5,
-    )  # fmt: skip
+        [p.time_ns for p in loose],
+        [p.error_texels for p in loose],
+        color="#777777",
+        linewidth=0.9,
+        linestyle="--",
+        zorder=1.5,
+    )
     for p in shown:
         color = palette[p.technique]
         axes.plot([p.low_ns, p.high_ns], [p.error_texels] * 2, color=color, linewidth=1.0, alpha=0.6)
         axes.plot(
-            [p.time_ns], [p.error_texels], linestyle="", marker="o", markersize=7 if p.on_front else 5,
-            markeredgecolor="#222222" if p.on_front else color, markerfacecolor=color if p.reliable else "white",
-        )  # fmt: skip
+            [p.time_ns],
+            [p.error_texels],
+            linestyle="",
+            marker="o",
+            markersize=7 if p.on_front else 5,
+            markeredgecolor="#222222" if p.on_front else color,
+            markerfacecolor=color if p.reliable else "white",
+        )
     axes.set_title("all elevations" if elevation == "all" else f"{elevation:g} degrees", fontsize=10)
     unit = "pixel" if result.kind == "scene" else "ray"
     axes.set_xlabel(f"time, ns a {unit}", fontsize=8)
     axes.set_ylabel("p99 hit error, texels", fontsize=8)
     axes.tick_params(labelsize=8, which="both")
+    axes.yaxis.set_major_formatter(_power)
+    axes.yaxis.set_minor_formatter("")
     if any(p.error_texels == FLOOR_TEXELS for p in shown):
         axes.axhline(FLOOR_TEXELS, color="#999999", linewidth=0.6, linestyle=":")
-        axes.text(
-            0.99, FLOOR_TEXELS, f"{FLOOR_TEXELS:g} and below ", transform=axes.get_yaxis_transform(),
-            fontsize=6.5, color="#888888", ha="right", va="top",
-        )  # fmt: skip
+
+
+def _power(value: float, _: int) -> str:
+    """A power of ten; the floor stands for everything below it too."""
+    sign = r"\leq " if value <= 1.001 * FLOOR_TEXELS else ""
+    return f"${sign}10^{{{round(math.log10(value))}}}$"
 
 
 def _draw_labels(figure: Any, axes: Any, result: CompareResult, elevation: Any) -> None:
@@ -111,14 +133,19 @@ def _draw_labels(figure: Any, axes: Any, result: CompareResult, elevation: Any) 
     named = sorted((p for p in shown if p.on_front or p.on_loose_front), key=lambda p: not p.on_front)
     texts = [
         axes.text(
-            0, 0, short(p.label), fontsize=_FONT_POINTS, color="#000000" if p.on_front else "#666666",
+            0,
+            0,
+            short(p.label),
+            fontsize=_FONT_POINTS,
+            color="#000000" if p.on_front else "#666666",
             weight="bold" if p.on_front else "normal",
         )
         for p in named
-    ]  # fmt: skip
+    ]
     sizes = [(extent.width, extent.height) for extent in (text.get_window_extent(renderer) for text in texts)]
     radius = 5.0 * _DPI / 100.0
-    labels = place_labels([at[p.label] for p in named], sizes, list(at.values()), (box.width, box.height), radius)
+    anchors = [at[p.label] for p in named]
+    labels = place_labels(anchors, sizes, list(at.values()), (box.width, box.height), radius)
     back = axes.transData.inverted().transform
     for point, text, size, label in zip(named, texts, sizes, labels, strict=True):
         text.set_position(back((label.x + box.x0, label.y + box.y0)))
@@ -127,6 +154,10 @@ def _draw_labels(figure: Any, axes: Any, result: CompareResult, elevation: Any) 
             middle = (label.x + 0.5 * size[0] + box.x0, label.y + 0.5 * size[1] + box.y0)
             end = back(middle)
             axes.plot(
-                [point.time_ns, end[0]], [point.error_texels, end[1]], color="#888888", linewidth=0.5, zorder=1
+                [point.time_ns, end[0]],
+                [point.error_texels, end[1]],
+                color="#888888",
+                linewidth=0.5,
+                zorder=1,
             )
         text.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.75})

@@ -83,7 +83,7 @@ def report(result: CompareResult, path: str | os.PathLike[str], title: str | Non
     """Write the report; see :meth:`CompareResult.report`."""
     if title is not None and not isinstance(title, str):
         raise TypeError(f"title must be a string, got {type(title).__name__}")
-    heading = title or ("Techniques on a mesh scene" if result.kind == "scene" else "Techniques on a height map")
+    heading = title or f"Techniques on a {'mesh scene' if result.kind == 'scene' else 'height map'}"
     template = resources.files(__package__).joinpath("report_template.html").read_text(encoding="utf-8")
     parts = {
         "TITLE": escape(heading),
@@ -166,10 +166,8 @@ def _table_row(row: Row, columns: list[Column], on_front: bool) -> str:
         cells.append(f"<td{sort}>{show(value)}</td>")
     hidden = "" if elevation == "all" else " hidden"
     front = ' class="on-front"' if on_front else ""
-    name = escape(row["label"])
-    return (
-        f'<tr data-elevation="{escape(str(elevation))}"{hidden}{front}><th scope="row">{name}</th>{"".join(cells)}</tr>'
-    )
+    name = f'<th scope="row">{escape(row["label"])}</th>'
+    return f'<tr data-elevation="{escape(str(elevation))}"{hidden}{front}>{name}{"".join(cells)}</tr>'
 
 
 def _picture(picture: Picture, result: CompareResult) -> dict[str, str]:
@@ -199,7 +197,7 @@ def _heat_uri(error_texels: NDArray[np.float32]) -> str:
     low, high = np.log10(HEAT_RANGE)
     with np.errstate(divide="ignore", invalid="ignore"):
         share = (np.log10(error_texels.astype(np.float64)) - low) / (high - low)
-    level = np.where(np.isnan(error_texels), 255.0, np.clip(np.nan_to_num(share, nan=0.0, neginf=0.0), 0.0, 1.0) * 254)
+    level = np.where(np.isnan(error_texels), 255.0, np.clip(np.nan_to_num(share), 0.0, 1.0) * 254.0)
     image = Image.fromarray(np.rint(level).astype(np.uint8))
     stops = np.linspace(0.0, 254.0, len(_VIRIDIS))
     palette = np.stack([np.interp(np.arange(255), stops, _VIRIDIS[:, c]) for c in range(3)], axis=1)
@@ -229,7 +227,8 @@ def _environment(environment: dict[str, Any]) -> str:
 
 def _value(value: Any) -> str:
     if isinstance(value, dict):
-        return "<br>".join(f"{escape(str(key).replace('_', ' '))}: {_value(inner)}" for key, inner in value.items())
+        named = ((escape(str(key).replace("_", " ")), _value(inner)) for key, inner in value.items())
+        return "<br>".join(f"{key}: {inner}" for key, inner in named)
     if isinstance(value, list | tuple):
         return "<br>".join(_value(inner) for inner in value)
     return escape(str(value))
