@@ -1,5 +1,5 @@
 //! Reading and writing image files: what is kept, what is refused.
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod common;
 

@@ -1,5 +1,5 @@
 //! Baked maps against those of other tools. Skipped, saying so, where the data is absent.
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod common;
 

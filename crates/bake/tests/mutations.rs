@@ -1,7 +1,7 @@
 //! Random damage to files of every format: an image or an error, never a panic.
 //!
 //! `PROPTEST_CASES=100000 cargo test --release -p bake --test mutations` digs deeper.
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod common;
 
@@ -9,8 +9,8 @@ use std::io::Cursor;
 use std::sync::LazyLock;
 
 use bake::{BakeError, decode_image, read_image};
-use common::noise;
 use common::tiff::Tiff;
+use common::{data, noise};
 use exr::prelude::*;
 use image::ImageFormat;
 use proptest::prelude::*;
@@ -89,6 +89,20 @@ static SEEDS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
     }
     seeds.extend([tiles(1, 3, 32), tiles(2, 3, 32), tiles(2, 1, 8), tiles(1, 2, 16)]);
     seeds.push(Tiff::grey(19, 11, 1, 1, bytes(33, 5)).bytes());
+    let floats = |bits: u32| Tiff::grey(19, 11, bits, 3, bytes(19 * 11 * bits as usize / 8, 6));
+    seeds.extend([16, 32, 64].map(|bits| Tiff { predictor: 3, ..floats(bits) }.bytes()));
+    let strips = [4, 4, 3, 4, 4, 3].map(|rows| bytes(19 * rows, 7)).to_vec();
+    seeds.push(
+        Tiff { samples: 2, planar: 2, chunk: (0, 4), chunks: strips, ..Tiff::grey(19, 11, 8, 1, vec![]) }
+            .bytes(),
+    );
+    for path in ["playcanvas/parallax_thumb.webp", "panda3d/layingrock-h.jpg"] {
+        seeds.extend(data(path).map(|path| std::fs::read(path).unwrap()));
+    }
+    for name in ["basi3p02", "tbbn3p08", "basn0g04", "basi6a16", "g03n0g16", "ps2n2c16"] {
+        seeds
+            .extend(data(&format!("malformed/pngsuite/{name}.png")).map(|path| std::fs::read(path).unwrap()));
+    }
     for compression in [
         Compression::Uncompressed,
         Compression::RLE,

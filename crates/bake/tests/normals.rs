@@ -1,5 +1,5 @@
 //! Slopes, normals and relief maps against closed forms and a plain reference.
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod common;
 

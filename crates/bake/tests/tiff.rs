@@ -1,5 +1,5 @@
 //! TIFF varieties, from files built here byte by byte.
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod common;
 

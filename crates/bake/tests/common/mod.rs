@@ -1,5 +1,5 @@
 //! Helpers of the integration tests.
-#![allow(dead_code, missing_docs)] // each test binary uses some of them
+#![allow(dead_code, missing_docs, clippy::unwrap_used)] // each test binary uses some of them
 
 pub mod tiff;
 

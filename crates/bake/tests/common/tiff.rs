@@ -1,5 +1,5 @@
 //! TIFF files built byte by byte.
-#![allow(dead_code, missing_docs)] // each test binary uses some of it
+#![allow(dead_code, missing_docs, clippy::unwrap_used)] // each test binary uses some of it
 
 use bake::{Samples, decode_image};
 
@@ -18,12 +18,25 @@ pub struct Tiff {
     /// Size of tiles, or rows a strip with a width of 0.
     pub chunk: (u32, u32),
     pub chunks: Vec<Vec<u8>>,
+    /// 1 none, 2 horizontal, 3 floating point.
+    pub predictor: u32,
 }
 
 impl Tiff {
     pub fn grey(width: u32, height: u32, bits: u32, format: u32, data: Vec<u8>) -> Self {
         let chunk = (0, height);
-        Self { width, height, bits, samples: 1, format, photometric: 1, planar: 1, chunk, chunks: vec![data] }
+        Self {
+            width,
+            height,
+            bits,
+            samples: 1,
+            format,
+            photometric: 1,
+            planar: 1,
+            chunk,
+            chunks: vec![data],
+            predictor: 1,
+        }
     }
 
     pub fn bytes(&self) -> Vec<u8> {
@@ -43,6 +56,7 @@ impl Tiff {
             (262, vec![self.photometric]),
             (277, vec![self.samples]),
             (284, vec![self.planar]),
+            (317, vec![self.predictor]),
             (339, each(self.format)),
         ];
         if self.chunk.0 == 0 {
