@@ -9,7 +9,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum MeshError {
     /// The file is not there.
-    #[error("mesh file not found: {}", path.display())]
+    #[error("file not found: {}", path.display())]
     NotFound {
         /// The path asked for.
         path: PathBuf,

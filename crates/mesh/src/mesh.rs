@@ -53,7 +53,7 @@ impl Mesh {
     /// Reads an OBJ, glTF or GLB file. The suffix decides; failing that, the first bytes do.
     ///
     /// glTF: the default scene only (the first one when none is marked, all root nodes when there
-    /// is no scene), node transforms applied, each primitive a part. A node transform that mirrors
+    /// is no scene, all meshes when there are no nodes either), node transforms applied, each primitive a part. A node transform that mirrors
     /// reverses the winding and the tangent's `w`, so that triangles stay counter-clockwise and
     /// normal maps keep their up. Given tangents are kept; otherwise MikkTSpace is run on each
     /// primitive in its own space. Missing normals are flat, as glTF asks.

@@ -68,8 +68,8 @@ pub(crate) struct Surface<'a> {
 /// The result has at least as many vertices: see [`Split`].
 ///
 /// # Errors
-/// [`MeshError::Arrays`] for mismatched lengths or an index out of range, [`MeshError::TooLarge`]
-/// when splitting would make too many vertices.
+/// [`MeshError::Arrays`] for mismatched lengths, an index out of range, NaN or infinity;
+/// [`MeshError::TooLarge`] when splitting would make too many vertices.
 pub fn tangents(
     method: FrameMethod,
     positions: &[Vec3],
@@ -87,6 +87,10 @@ pub fn tangents(
     }
     if indices.iter().flatten().any(|&i| i as usize >= vertices) {
         return Err(MeshError::arrays(format!("a triangle uses a vertex beyond the last, {vertices} - 1")));
+    }
+    let finite = |i: usize| positions[i].is_finite() && normals[i].is_finite() && uvs[i].is_finite();
+    if let Some(vertex) = (0..vertices).find(|&i| !finite(i)) {
+        return Err(MeshError::arrays(format!("vertex {vertex} is NaN or infinite")));
     }
     let surface = Surface { positions, normals, uvs, indices };
     let mut warnings = Vec::new();

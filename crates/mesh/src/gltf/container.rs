@@ -29,7 +29,7 @@ pub(super) fn split<'a>(bytes: &'a [u8], name: &str) -> Result<(&'a [u8], Option
         Some((kind, _)) => return Err(fail(format!("first chunk is {:?}, not JSON", text(kind)))),
         None => return Err(fail("no JSON chunk".to_owned())),
     };
-    // Unknown chunks after the JSON are to be ignored, broken ones included.
+    // Chunks of unknown kind are to be ignored.
     match chunk(&mut rest).map_err(fail)? {
         Some((b"BIN\0", data)) => Ok((json, Some(data))),
         _ => Ok((json, None)),

@@ -22,6 +22,12 @@ pub(super) fn instances(
     warnings: &mut Vec<String>,
 ) -> Result<Vec<Instance>, MeshError> {
     let fail = |problem: String| MeshError::malformed(name, problem);
+    if root.nodes.is_empty() && root.scenes.is_empty() {
+        // A library of meshes: nothing places them, so each is shown as it is.
+        warnings.push("the file has no scene; its meshes are read where they are".to_owned());
+        let as_it_is = |mesh| Instance { mesh, name: String::new(), scene_from_mesh: DMat4::IDENTITY };
+        return Ok((0..root.meshes.len()).map(as_it_is).collect());
+    }
     let mut found = Vec::new();
     let mut visited = vec![false; root.nodes.len()];
     let mut stack: Vec<(usize, DMat4)> =

@@ -8,7 +8,7 @@ use std::fmt::Write;
 use glam::DVec3;
 
 use super::polygon::triangulate;
-use super::text::{for_each_line, keyword};
+use super::text::{for_each_line, keyword, short};
 use crate::error::MeshError;
 use crate::limits::check_elements;
 
@@ -118,7 +118,7 @@ impl Cleaner<'_> {
             *slot = word
                 .parse::<f32>()
                 .or_else(|e| if word.to_ascii_lowercase().contains("nan") { Ok(f32::NAN) } else { Err(e) })
-                .map_err(|_| self.fail(number, format!("{word:?} is not a number")))?;
+                .map_err(|_| self.fail(number, format!("{:?} is not a number", short(word))))?;
             count += 1;
         }
         if count < needed {
@@ -137,7 +137,7 @@ impl Cleaner<'_> {
         }
         let point = point.as_vec3();
         if !point.is_finite() {
-            return Err(self.fail(number, format!("position {rest:?} is not finite")));
+            return Err(self.fail(number, format!("position {:?} is not finite", short(rest))));
         }
         self.positions.push(point.as_dvec3());
         check_elements("OBJ positions", self.positions.len())?;
@@ -151,7 +151,7 @@ impl Cleaner<'_> {
         for word in rest.split_whitespace() {
             let mut corner = [0u32; 3];
             for (i, text) in word.split('/').enumerate() {
-                let bad = |what: &str| self.fail(number, format!("corner {word:?} {what}"));
+                let bad = |what: &str| self.fail(number, format!("corner {:?} {what}", short(word)));
                 let Some(slot) = corner.get_mut(i) else { return Err(bad("has more than three indices")) };
                 if text.is_empty() && i > 0 {
                     continue;

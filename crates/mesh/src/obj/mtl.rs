@@ -5,7 +5,7 @@ use std::fmt::Write;
 use std::io::BufReader;
 use std::path::Path;
 
-use super::text::{decode, for_each_line, keyword};
+use super::text::{decode, for_each_line, keyword, short};
 use super::texture;
 use crate::arrays::read_file;
 use crate::limits::MAX_MTL_BYTES;
@@ -33,7 +33,7 @@ pub(super) fn read_all(lines: &[String], folder: &Path, warnings: &mut Vec<Strin
             }
             match texture::find(folder, name) {
                 Some(path) => library.read(&path, name, warnings),
-                None => warnings.push(format!("material library {name:?} not found")),
+                None => warnings.push(format!("material library {:?} not found", short(name))),
             }
         }
     }
@@ -92,7 +92,7 @@ fn clean(text: &str, warn: &mut impl FnMut(String)) -> String {
         let key = canonical(key);
         let numbers: Vec<f32> =
             rest.split_whitespace().map_while(|w| w.parse().ok()).filter(|n: &f32| n.is_finite()).collect();
-        let mut bad = |what: &str| warn(format!("line {number}: {key} {rest:?} {what}"));
+        let mut bad = |what: &str| warn(format!("line {number}: {key} {:?} {what}", short(rest)));
         let _ = match key {
             "newmtl" => {
                 named = !rest.is_empty();

@@ -65,6 +65,14 @@ fn without_comment(line: &str) -> &str {
     line.match_indices('#').find(|&(at, _)| starts_word(at)).map_or(line, |(at, _)| &line[..at])
 }
 
+/// At most 40 characters of a text, for messages.
+pub(super) fn short(text: &str) -> String {
+    match text.char_indices().nth(40) {
+        Some((at, _)) => format!("{}...", &text[..at]),
+        None => text.to_owned(),
+    }
+}
+
 /// Keyword and the rest, trimmed.
 pub(super) fn keyword(line: &str) -> (&str, &str) {
     match line.split_once(char::is_whitespace) {
