@@ -6,6 +6,8 @@ import builtins
 import json
 import os
 import re
+import shutil
+import subprocess
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -365,6 +367,55 @@ def test_the_report_is_one_page_that_loads_nothing(result: bw.CompareResult, tmp
     assert pictures[0]["label"] == "exact"
     assert len(pictures) == len(SETTINGS)
     assert text.count("<svg") == len(result.elevations)
+
+
+DRIVE = """
+<script>
+const check = (name, ok) => { document.title += (ok ? " ok:" : " FAILED:") + name; };
+const change = (node, value) => { node.value = value; node.dispatchEvent(new Event("change")); };
+document.title = "driven";
+const shown = () => [...document.querySelectorAll("#rows tbody tr")].filter((row) => !row.hidden);
+check("pictures", !document.getElementById("pictures").hidden && document.getElementById("over").src);
+change(document.getElementById("mode"), "heat");
+check("heat", document.getElementById("over").src.startsWith("data:image/png"));
+check("key", !document.getElementById("heat-key").hidden);
+const slider = document.getElementById("slider");
+slider.value = 20;
+slider.dispatchEvent(new Event("input"));
+check("slider", document.getElementById("viewer").style.getPropertyValue("--at") === "20%");
+const before = shown().length;
+change(document.querySelector("select.elevation"), "10.0");
+check("rows", shown().length === before && shown().every((row) => row.dataset.elevation === "10.0"));
+check("charts", [...document.querySelectorAll("#charts > div")].filter((part) => !part.hidden).length === 1);
+const heads = [...document.querySelectorAll("#rows thead th")];
+const p99 = heads.findIndex((head) => head.textContent.startsWith("p99"));
+const column = () => shown().map((row) => Number(row.cells[p99].dataset.value));
+const sorted = (values) => values.every((value, i) => i === 0 || values[i - 1] <= value);
+heads[p99].querySelector("button").click();
+check("up", sorted(column()) && heads[p99].getAttribute("aria-sort") === "ascending");
+heads[p99].querySelector("button").click();
+check("down", sorted(column().reverse()));
+check("narrow", document.documentElement.scrollWidth <= window.innerWidth);
+</script>
+"""
+
+
+def test_the_report_works_in_a_browser(result: bw.CompareResult, tmp_path: Path) -> None:
+    browsers = ("chromium", "chromium-browser", "google-chrome")
+    browser = next((found for found in map(shutil.which, browsers) if found), None)
+    if browser is None:
+        pytest.skip("no Chromium")
+    page = result.report(tmp_path / "report.html")
+    page.write_text(page.read_text().replace("</body>", DRIVE + "</body>"))
+    command = [
+        *(browser, "--headless", "--no-sandbox", "--disable-gpu", "--window-size=500,900"),
+        *(f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom", page.as_uri()),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    title = re.search(r"<title>(.*?)</title>", done.stdout)
+    assert title, done.stderr
+    assert "FAILED" not in title[1]
+    assert title[1].count("ok:") == 9
 
 
 def test_pictures_show_the_map_and_where_it_is_wrong(result: bw.CompareResult) -> None:

@@ -7,6 +7,9 @@ use crate::metrics::percentile;
 use crate::timing::time_cpu;
 use crate::{CompareError, DeviceMarch, Metrics, RayErrors, Rays, Reference, Reported, Timing, rays};
 
+/// Most rays at one elevation: errors of all rays are kept until the end, for percentiles.
+pub const MAX_RAYS: usize = 1 << 20;
+
 /// What to compare, and how thoroughly.
 #[derive(Debug, Clone)]
 pub struct Plan {
@@ -132,8 +135,8 @@ impl Plan {
         if self.repeats == 0 {
             return few("repeats", 0, "at least one is needed to take a time");
         }
-        if !(1..=1 << 24).contains(&self.rays) {
-            return few("rays", self.rays, "it must be in 1..16777216");
+        if !(1..=MAX_RAYS).contains(&self.rays) {
+            return few("rays", self.rays, &format!("it must be in 1..{MAX_RAYS}"));
         }
         Ok(())
     }
