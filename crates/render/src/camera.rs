@@ -74,7 +74,8 @@ impl Camera {
     pub fn clip_from_relative(&self, size: [u32; 2], first_row: u32, rows: u32) -> DMat4 {
         let [width, height] = size.map(f64::from);
         let (right, up, forward) = self.axes();
-        let view = DMat4::from_cols(right.extend(0.0), up.extend(0.0), (-forward).extend(0.0), DVec4::W).transpose();
+        let view =
+            DMat4::from_cols(right.extend(0.0), up.extend(0.0), (-forward).extend(0.0), DVec4::W).transpose();
         let focal = 1.0 / (0.5 * self.fov_y).tan();
         let projection = DMat4::from_cols(
             DVec4::X * (focal * height / width),

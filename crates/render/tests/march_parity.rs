@@ -21,7 +21,10 @@ fn rays(field: &HeightField, seed: u64) -> (Vec<f32>, Vec<f32>) {
         let elevation = random.between(2.0, 90.0).to_radians();
         let azimuth = random.between(0.0, std::f64::consts::TAU);
         let lateral = elevation.cos();
-        origins.extend([random.between(-1.5, 2.5), random.between(-1.5, 2.5), random.between(1.0, 1.4)].map(|x| x as f32));
+        origins.extend(
+            [random.between(-1.5, 2.5), random.between(-1.5, 2.5), random.between(1.0, 1.4)]
+                .map(|x| x as f32),
+        );
         directions.extend(
             [
                 lateral * azimuth.cos() / f64::from(extent.tile_size[0]),
@@ -51,10 +54,12 @@ fn compare(device: &Device, technique: &Technique, name: &str, field: &HeightFie
     let ours = render::march(device, field, technique, &origins, &directions).unwrap();
     let options = MarchOptions::default();
     let twin =
-        heightfield::march(field, technique, RayArray::F32(&origins), RayArray::F32(&directions), &options).unwrap();
+        heightfield::march(field, technique, RayArray::F32(&origins), RayArray::F32(&directions), &options)
+            .unwrap();
     let (ours_status, twin_status) = (ours.hits.status.unwrap(), twin.status.unwrap());
     let hit = Status::Hit as u8;
-    let differing = ours_status.iter().zip(&twin_status).filter(|(a, b)| (**a == hit) != (**b == hit)).count();
+    let differing =
+        ours_status.iter().zip(&twin_status).filter(|(a, b)| (**a == hit) != (**b == hit)).count();
     let (ours_uv, twin_uv) = (ours.hits.uv.unwrap(), twin.uv.unwrap());
     let mut errors: Vec<f64> = (0..RAYS)
         .filter(|&i| ours_status[i] == hit && twin_status[i] == hit)
@@ -131,9 +136,9 @@ fn shadow_rays_agree() {
                     let at = |values: &[f32]| [0, 1, 2].map(|axis| f64::from(values[3 * i + axis]));
                     let (origin, direction) = (at(&origins), at(&directions));
                     let cosine = field.extent().cos_theta(direction);
-                    let twin = heightfield::Segment::clip(origin, direction, cosine, period).is_some_and(|segment| {
-                        technique.occluded(&field, segment.start, segment.delta, segment.cos_theta)
-                    });
+                    let twin = heightfield::Segment::clip(origin, direction, cosine, period).is_some_and(
+                        |segment| technique.occluded(&field, segment.start, segment.delta, segment.cos_theta),
+                    );
                     ours[i] != twin
                 })
                 .count();

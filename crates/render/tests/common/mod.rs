@@ -3,15 +3,18 @@
 
 use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use heightfield::{Extent, HeightField, Wrap};
+use mesh::Mesh;
 use render::{Camera, Device, Light};
 
 /// The device, or `None` where there is none and none is required.
 pub fn device() -> Option<Arc<Device>> {
     match render::device() {
         Ok(device) => Some(device),
-        Err(error) if std::env::var("BUMPWGPU_REQUIRE_GPU").is_ok_and(|value| value == "1") => panic!("{error}"),
+        Err(error) if std::env::var("BUMPWGPU_REQUIRE_GPU").is_ok_and(|value| value == "1") => {
+            panic!("{error}")
+        }
         Err(error) => {
             eprintln!("skipped: {error}");
             None
@@ -54,12 +57,7 @@ pub fn ridges(u: f64, v: f64) -> f64 {
     if near(u) || near(v + 0.3 * u) { 0.95 } else { 0.1 + 0.05 * (9.0 * u).sin().abs() }
 }
 
-pub fn field(
-    height: impl Fn(f64, f64) -> f64,
-    size: [usize; 2],
-    wrap: Wrap,
-    extent: Extent,
-) -> HeightField {
+pub fn field(height: impl Fn(f64, f64) -> f64, size: [usize; 2], wrap: Wrap, extent: Extent) -> HeightField {
     let [w, h] = size;
     let texels: Vec<f32> = (0..w * h)
         .map(|at| height(((at % w) as f64 + 0.5) / w as f64, ((at / w) as f64 + 0.5) / h as f64) as f32)
@@ -74,4 +72,17 @@ pub fn front() -> Camera {
 
 pub fn sun(direction: Vec3) -> Light {
     Light::Directional { direction, color: [1.0; 3], intensity: 0.8 }
+}
+
+/// A mesh with MikkTSpace tangents.
+pub fn mesh_of(positions: &[Vec3], normals: &[Vec3], uvs: &[Vec2], indices: &[[u32; 3]]) -> Mesh {
+    let normals = bytemuck::cast_slice(normals);
+    Mesh::from_arrays(
+        bytemuck::cast_slice(positions),
+        indices,
+        bytemuck::cast_slice(uvs),
+        Some(normals),
+        None,
+    )
+    .unwrap()
 }
