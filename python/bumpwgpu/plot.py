@@ -52,6 +52,7 @@ def plot(result: CompareResult, path: str | os.PathLike[str]) -> Path:
     handles.append(_marker("#999999", "skips hits (over 0.1 % of rays)", filled=False))
     figure.legend(handles=handles, loc="lower center", ncols=min(len(handles), 6), fontsize=8, frameon=False)
     figure.tight_layout(rect=(0.0, 0.9 / (4.3 * rows + 1.0), 1.0, 0.98))
+    figure.canvas.draw()
     for axes, elevation in zip(grid.flat, panels, strict=False):
         _draw_labels(figure, axes, result, elevation)
     buffer = io.BytesIO()
@@ -124,7 +125,6 @@ def _power(value: float, _: int) -> str:
 
 def _draw_labels(figure: Any, axes: Any, result: CompareResult, elevation: Any) -> None:
     """Names of the front, placed in pixels once the layout stands."""
-    figure.canvas.draw()
     renderer = figure.canvas.get_renderer()
     box = axes.get_window_extent(renderer)
     shown = points(result, elevation)
