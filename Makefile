@@ -8,6 +8,11 @@ ifdef CI
 export BUMPWGPU_REQUIRE_GPU := 1
 endif
 
+# Where nobody is logged in, Mesa's device-selection layer prints errors about displays; devices are ranked without it.
+ifndef XDG_RUNTIME_DIR
+export NODEVICE_SELECT := 1
+endif
+
 .PHONY: help setup device extension demo test test-rust test-python test-slow wheel bench lint clean
 .DEFAULT_GOAL := help
 
@@ -54,7 +59,7 @@ lint: extension ## formatting, clippy, ruff, mypy, stubtest
 	.venv/bin/ruff check
 	.venv/bin/ruff format --check
 	.venv/bin/mypy
-	$(PY) -m mypy.stubtest --mypy-config-file pyproject.toml bumpwgpu
+	$(PY) -m mypy.stubtest --mypy-config-file pyproject.toml bumpwgpu._bumpwgpu bumpwgpu.techniques
 
 clean: ## remove what the build and the demo wrote
 	rm -rf target dist demo_output python/bumpwgpu/*.so .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -42,6 +42,8 @@ TECHNIQUES = (
     "interval",
     "exact",
 )
+# None: every technique, on a height map with several step counts.
+COMPARED: tuple[str, ...] | None = None
 ELEVATIONS = (90, 45, 20, 10, 5)
 MAX_ERROR_TEXELS = 0.5
 # Share of a comparison in the progress bar, in pictures.
@@ -207,7 +209,7 @@ def compare(subject: Subject, name: str, source: Any, folder: Path, step: Step) 
         step(f"comparing {subject.name}, {name}: {text}", now - last)
         last = now
 
-    result = bw.compare(source, elevations=ELEVATIONS, rays=4096, repeats=3, progress=progress)
+    result = bw.compare(source, COMPARED, elevations=ELEVATIONS, rays=4096, repeats=3, progress=progress)
     stem = folder / f"{subject.name}_{name}"
     result.plot(stem.with_suffix(".png"))
     result.to_json(stem.with_suffix(".json"))
