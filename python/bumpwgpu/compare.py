@@ -230,17 +230,7 @@ class CompareResult:
         rows, measured = self._measured(elevation, time)
         allowed = number("max_failure_rate", max_failure_rate, 0.0, 1.0)
         front = _bumpwgpu.compare_front(measured, allowed)
-        return [
-            {
-                **rows[at],
-                "tied_with": [
-                    rows[other]["label"]
-                    for other in front
-                    if other != at and _tied(measured[at], measured[other])
-                ],
-            }
-            for at in front
-        ]
+        return [{**rows[at], "tied_with": [rows[other]["label"] for other in tied]} for at, tied in front]
 
     def recommend(
         self,
@@ -394,7 +384,12 @@ class CompareResult:
         return report(self, path, title)
 
     def pictures(self) -> list[Picture]:
-        """Pictures of the exact technique first, then of each technique's defaults and the Pareto front."""
+        """Pictures of the exact technique first, then of each technique's defaults and the Pareto front.
+
+        Returns
+        -------
+        list of Picture
+        """
         if not self._pictures and isinstance(self._source, HeightMap):
             self._pictures.extend(_planar_pictures(self._source, self._shown()))
         return list(self._pictures)
@@ -414,11 +409,6 @@ class CompareResult:
     def __repr__(self) -> str:
         count = len(self.select("all"))
         return f"<CompareResult of {count} settings ({self.kind}), timed on {self.timed_on}>"
-
-
-def _tied(a: Any, b: Any) -> bool:
-    (a_low, _, a_high), (b_low, _, b_high) = a[1], b[1]
-    return bool(a_high >= b_low and b_high >= a_low)
 
 
 def compare(

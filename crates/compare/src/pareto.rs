@@ -24,23 +24,34 @@ fn dominates(a: &Candidate, b: &Candidate) -> bool {
 }
 
 /// Indices on the Pareto front, by rising median time.
+///
+/// With spreads, being dominated does not carry over from one to the next: a may tie b and b tie c
+/// while a is clearly faster than c. So candidates are taken from the most accurate one on, and only
+/// those that were kept can keep others out.
 pub fn front(candidates: &[Candidate]) -> Vec<usize> {
-    let usable = |i: &usize| candidates[*i].eligible && candidates[*i].error.is_finite();
-    let mut front: Vec<usize> = (0..candidates.len())
-        .filter(usable)
-        .filter(|&i| !(0..candidates.len()).filter(usable).any(|j| dominates(&candidates[j], &candidates[i])))
+    let mut order: Vec<usize> = (0..candidates.len())
+        .filter(|&i| candidates[i].eligible && candidates[i].error.is_finite())
         .collect();
-    front.sort_by(|&a, &b| candidates[a].time.median_ns.total_cmp(&candidates[b].time.median_ns));
+    let by_time = |a: usize, b: usize| candidates[a].time.median_ns.total_cmp(&candidates[b].time.median_ns);
+    order.sort_by(|&a, &b| candidates[a].error.total_cmp(&candidates[b].error).then(by_time(a, b)));
+    let mut front: Vec<usize> = Vec::new();
+    for i in order {
+        if !front.iter().any(|&kept| dominates(&candidates[kept], &candidates[i])) {
+            front.push(i);
+        }
+    }
+    front.sort_by(|&a, &b| by_time(a, b));
     front
 }
 
-/// For each candidate the others whose time cannot be told from its own.
-pub fn ties(candidates: &[Candidate]) -> Vec<Vec<usize>> {
-    let tied =
-        |a: &Candidate, b: &Candidate| !a.time.clearly_faster(&b.time) && !b.time.clearly_faster(&a.time);
-    (0..candidates.len())
-        .map(|i| (0..candidates.len()).filter(|&j| j != i && tied(&candidates[i], &candidates[j])).collect())
-        .collect()
+/// Those of `others` whose time cannot be told from that of candidate `i`.
+pub fn ties(candidates: &[Candidate], i: usize, others: &[usize]) -> Vec<usize> {
+    let time = &candidates[i].time;
+    let tied = |j: usize| {
+        let other = &candidates[j].time;
+        !time.clearly_faster(other) && !other.clearly_faster(time)
+    };
+    others.iter().copied().filter(|&j| j != i && tied(j)).collect()
 }
 
 #[cfg(test)]
@@ -77,7 +88,9 @@ mod tests {
     fn a_lead_within_the_noise_does_not_count() {
         let all = [candidate(1.00, 0.1, 5.0), candidate(1.05, 0.1, 1.0)];
         assert_eq!(front(&all), [1], "the accurate one is not slower beyond the spread");
-        assert_eq!(ties(&all), [vec![1], vec![0]]);
+        assert_eq!((ties(&all, 0, &[0, 1]), ties(&all, 1, &[0])), (vec![1], vec![0]));
+        let chain = [candidate(1.0, 0.6, 9.0), candidate(2.0, 0.6, 5.0), candidate(3.0, 0.6, 1.0)];
+        assert_eq!(front(&chain), [0, 2], "the middle one is out, so it cannot keep the first one out");
         let equal = [candidate(1.00, 0.1, 1.0), candidate(1.05, 0.1, 1.0)];
         assert_eq!(front(&equal), [0, 1], "a tie in both stays a tie");
     }

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use compare::pareto::{Candidate, front};
+use compare::pareto::{Candidate, front, ties};
 use compare::picture::View;
 use compare::recommend::{Budget, Entry, recommend};
 use compare::{Metrics, Plan, RayErrors, Rays, Reference, Reported, Row, Timing, sweep};
@@ -277,10 +277,11 @@ fn timing([low_ns, median_ns, high_ns]: [f64; 3]) -> Timing {
     Timing { median_ns, low_ns, high_ns }
 }
 
-/// Indices of the settings on the Pareto front, by rising time. Settings that fail on more than
-/// `max_failure_rate` of the rays cannot be on it.
+/// Indices of the settings on the Pareto front, by rising time, each with the others on it whose time
+/// cannot be told from its own. Settings that fail on more than `max_failure_rate` of the rays cannot
+/// be on it.
 #[pyfunction]
-pub fn compare_front(measured: Vec<Measured>, max_failure_rate: f64) -> Vec<usize> {
+pub fn compare_front(measured: Vec<Measured>, max_failure_rate: f64) -> Vec<(usize, Vec<usize>)> {
     let candidates: Vec<Candidate> = measured
         .into_iter()
         .map(|(_, time, error, failure_rate)| Candidate {
@@ -289,7 +290,8 @@ pub fn compare_front(measured: Vec<Measured>, max_failure_rate: f64) -> Vec<usiz
             eligible: failure_rate <= max_failure_rate,
         })
         .collect();
-    front(&candidates)
+    let kept = front(&candidates);
+    kept.iter().map(|&i| (i, ties(&candidates, i, &kept))).collect()
 }
 
 /// Index of the cheapest setting within the budget, if any, and why.
