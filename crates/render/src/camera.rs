@@ -60,7 +60,7 @@ impl Camera {
             ));
         }
         let forward = self.forward();
-        if !(self.near() > 1e-30) || forward == DVec3::ZERO {
+        if self.near() <= 1e-30 || forward == DVec3::ZERO {
             return fail(format!("eye and target are both at {}", self.eye));
         }
         if forward.cross(self.up.normalize_or_zero()).length() < 1e-6 {

@@ -1,5 +1,7 @@
 //! Outputs against closed forms on a flat quad, and against the Rust twins of surfaces and searches.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
 mod common;
 
 use std::sync::Arc;

@@ -1,5 +1,7 @@
 //! Only what a technique uses is baked, uploaded and compiled.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
 mod common;
 
 use std::sync::Arc;

@@ -1,5 +1,7 @@
 //! Host structs against naga's layout of their WGSL twins, and programs against what the host binds.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
 use std::mem::offset_of;
 
 use render::uniforms::{DrawInfo, FrameInfo, HeightInfo, LightInfo, MarchResult, MarchSegment, MaterialInfo};

@@ -1,5 +1,7 @@
 //! Every search on the device against its Rust twin.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
 mod common;
 
 use common::{Random, fbm, field, ridges};

@@ -1,5 +1,7 @@
 //! What pictures must show: right side up, not mirrored, lit from where the light is.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
 mod common;
 
 use std::sync::Arc;
