@@ -148,7 +148,7 @@ def test_import_touches_no_gpu(python: Path, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_source_distribution_builds_from_itself(tmp_path: Path) -> None:
-    run([sys.executable, "-m", "maturin", "sdist", "--quiet", "--out", tmp_path], ROOT)
+    run([sys.executable, "-m", "maturin", "sdist", "--out", tmp_path], ROOT)
     (archive,) = tmp_path.glob("*.tar.gz")
     run(["tar", "xzf", archive], tmp_path)
     (source,) = (path for path in tmp_path.iterdir() if path.is_dir())
