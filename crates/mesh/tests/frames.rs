@@ -201,6 +201,20 @@ fn repeated_triangles_do_not_hang() {
     assert!(mesh.tangents.iter().all(|&t| t == Vec4::new(1.0, 0.0, 0.0, 1.0)));
 }
 
+/// Triangles at one place with UVs of their own: nothing welds, though all positions are equal.
+#[test]
+fn stacked_triangles_do_not_hang() {
+    let count = 100_000u32;
+    let positions = [[0f32, 0., 0.], [1., 0., 0.], [0., 1., 0.]].repeat(count as usize);
+    let uvs: Vec<[f32; 2]> =
+        (0..count).map(|i| i as f32 / 1e5).flat_map(|u| [[u, 1.], [u + 1., 1.], [u, 0.]]).collect();
+    let indices: Vec<[u32; 3]> = (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let start = Instant::now();
+    let mesh = Mesh::from_arrays(&positions, &indices, &uvs, None, None).unwrap();
+    assert!(start.elapsed() < Duration::from_secs(20));
+    assert!(mesh.tangents.iter().all(|t| t.x > 0.999 && t.w == 1.0));
+}
+
 /// MikkTSpace as its paper defines it, in f64 and written for clarity: corners at the same position,
 /// normal and UV, reached from each other over shared edges between faces of equal orientation,
 /// share the angle-weighted sum of the faces' tangents projected into the plane of the normal.

@@ -128,3 +128,34 @@ fn a_face_without_uvs_among_others_is_said() {
     assert!(mesh.warnings.iter().any(|w| w.contains("1 faces have no texture coordinates")));
     assert_eq!(mesh.uvs[mesh.indices[0][2] as usize], Vec2::new(1.0, 0.0));
 }
+
+/// A name of a hundred thousand characters, carried by each of thousands of parts, would be gigabytes.
+#[test]
+fn long_names_are_cut() {
+    let folder = tempfile::tempdir().unwrap();
+    let long = "x".repeat(100_000);
+    std::fs::write(folder.path().join("m.mtl"), format!("newmtl {long}\nnewmtl b\n")).unwrap();
+    let turns = format!("usemtl {long}\nf 1/1 2/2 3/3\nusemtl b\nf 1/1 3/3 4/4\n").repeat(20);
+    let text = format!("mtllib m.mtl\n{SQUARE}g {long}\n{turns}");
+    let mesh = Mesh::from_obj(text.as_bytes(), folder.path()).unwrap();
+    assert_eq!(mesh.parts.len(), 40);
+    assert!(mesh.parts.iter().all(|p| p.name.len() == 256 && p.material.is_some()));
+    assert_eq!(mesh.parts[0].material, Some(0));
+}
+
+/// Stars of many corners: clipping ears from all of them would take hours.
+#[test]
+fn many_large_concave_polygons_do_not_hang() {
+    let mut text = String::new();
+    for i in 0..4000 {
+        let (sin, cos) = (i as f32 * std::f32::consts::TAU / 4000.0).sin_cos();
+        let r = if i % 2 == 0 { 1.0 } else { 0.3 };
+        text += &format!("v {} {} 0\n", r * cos, r * sin);
+    }
+    let polygon: String = (1..=4000).map(|i| format!(" {i}")).collect();
+    text += &format!("f{polygon}\n").repeat(20);
+    let start = std::time::Instant::now();
+    let mesh = read(&text);
+    assert!(start.elapsed() < std::time::Duration::from_secs(30), "{:?}", start.elapsed());
+    assert_eq!(mesh.indices.len(), 20 * 3998);
+}

@@ -42,11 +42,10 @@ pub(super) fn corners(surface: Surface<'_>, warnings: &mut Vec<String>) -> Vec<O
         }
     }
     let most = u64::from(faces_at.iter().copied().max().unwrap_or(0));
-    let pairs: u64 = faces_at.iter().map(|&k| u64::from(k) * u64::from(k)).sum();
+    let pairs = pairs_at_positions(surface, &good);
     if pairs > PAIRS + PAIRS_PER_TRIANGLE * good.len() as u64 {
-        warnings.push(format!(
-            "{most} triangles meet at one vertex, too many for MikkTSpace; per-face tangents used"
-        ));
+        let why = "too many triangles meet at one position for MikkTSpace; per-face tangents used";
+        warnings.push(why.to_owned());
         return dietrich::corners(surface);
     }
 
@@ -74,6 +73,27 @@ fn weld(surface: Surface<'_>) -> Vec<u32> {
             }
         })
         .collect()
+}
+
+/// Pairs of faces that meet at a position. Bounds every step that compares pairs: welding looks at
+/// all corners of a position, grouping at the faces of a welded vertex.
+fn pairs_at_positions(surface: Surface<'_>, good: &[u32]) -> u64 {
+    let mut ids: HashMap<[u32; 3], u32> = HashMap::with_capacity(surface.positions.len());
+    let place: Vec<u32> = surface
+        .positions
+        .iter()
+        .map(|p| {
+            let next = ids.len() as u32;
+            *ids.entry((*p + 0.0).to_array().map(f32::to_bits)).or_insert(next)
+        })
+        .collect();
+    let mut faces_at = vec![0u32; ids.len()];
+    for &face in good {
+        for vertex in surface.indices[face as usize] {
+            faces_at[place[vertex as usize] as usize] += 1;
+        }
+    }
+    faces_at.iter().map(|&k| u64::from(k) * u64::from(k)).sum()
 }
 
 /// Gives corners of degenerate triangles the tangent of the first sound corner at the same vertex.

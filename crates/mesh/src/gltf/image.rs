@@ -4,11 +4,16 @@ use std::collections::HashMap;
 
 use super::buffers::Buffers;
 use super::uri::{self, Target};
+use crate::limits::MAX_IMAGE_BYTES;
 use crate::material::ImageSource;
 
 /// The image sources in use, read once each.
 #[derive(Default)]
-pub(super) struct Images(HashMap<usize, Option<ImageSource>>);
+pub(super) struct Images {
+    found: HashMap<usize, Option<ImageSource>>,
+    /// Bytes copied so far: many images may name one large view.
+    spent: u64,
+}
 
 impl Images {
     /// The image of texture `texture`; `None`, with a warning, when there is none to be had.
@@ -22,16 +27,17 @@ impl Images {
             warnings.push(format!("texture {texture} has no image that can be read"));
             return None;
         };
-        self.0
-            .entry(index)
-            .or_insert_with(|| match find(buffers, index) {
-                Ok(image) => Some(image),
-                Err(problem) => {
-                    warnings.push(format!("image {index}: {problem}"));
-                    None
-                }
-            })
-            .clone()
+        if let Some(known) = self.found.get(&index) {
+            return known.clone();
+        }
+        let image = find(buffers, index, MAX_IMAGE_BYTES - self.spent)
+            .inspect_err(|problem| warnings.push(format!("image {index}: {problem}")))
+            .ok();
+        if let Some(ImageSource::Encoded(bytes)) = &image {
+            self.spent += bytes.len() as u64;
+        }
+        self.found.insert(index, image.clone());
+        image
     }
 }
 
@@ -46,15 +52,24 @@ fn source(buffers: &Buffers<'_>, texture: usize) -> Option<usize> {
     webp.get("source")?.as_u64().and_then(|index| usize::try_from(index).ok())
 }
 
-fn find(buffers: &Buffers<'_>, index: usize) -> Result<ImageSource, String> {
+/// Finds an image of at most `limit` bytes.
+fn find(buffers: &Buffers<'_>, index: usize, limit: u64) -> Result<ImageSource, String> {
+    let fits = |bytes: &[u8]| match bytes.len() as u64 <= limit {
+        true => Ok(()),
+        false => Err(format!("images inside the file take more than {MAX_IMAGE_BYTES} bytes")),
+    };
     let image = buffers.root.images.get(index).ok_or("no such image")?;
     if let Some(view) = image.buffer_view {
         let view = buffers.view(view.value()).map_err(|error| error.to_string())?;
+        fits(view.bytes)?;
         return Ok(ImageSource::Encoded(view.bytes.into()));
     }
     let uri = image.uri.as_deref().ok_or("neither a URI nor a buffer view")?;
     match uri::resolve(uri)? {
-        Target::Data(bytes) => Ok(ImageSource::Encoded(bytes.into())),
+        Target::Data(bytes) => {
+            fits(&bytes)?;
+            Ok(ImageSource::Encoded(bytes.into()))
+        }
         Target::File(relative) => {
             let path = buffers.file(&relative)?;
             if path.is_file() {

@@ -10,6 +10,7 @@ use gltf::json::texture::Info;
 use super::buffers::Buffers;
 use super::image::Images;
 use crate::error::MeshError;
+use crate::limits;
 use crate::material::MaterialSource;
 
 /// Which TEXCOORD set a texture uses and how KHR_texture_transform moves it.
@@ -78,7 +79,7 @@ impl Materials {
         };
         let pbr = &material.pbr_metallic_roughness;
         let mut result = MaterialSource {
-            name: material.name.clone().unwrap_or_default(),
+            name: limits::name(material.name.as_deref().unwrap_or("")).to_owned(),
             albedo_factor: pbr.base_color_factor.0,
             ..MaterialSource::default()
         };

@@ -9,7 +9,7 @@ use super::material::Materials;
 use super::primitive;
 use super::scene::Instance;
 use crate::error::MeshError;
-use crate::limits::{MAX_ELEMENTS, check_elements};
+use crate::limits::{self, MAX_ELEMENTS, check_elements};
 use crate::mesh::{Mesh, Part};
 
 /// Appends every instance to `mesh`.
@@ -42,7 +42,7 @@ pub(super) fn build(buffers: &Buffers<'_>, instances: &[Instance], mesh: &mut Me
                 let first = mesh.indices.len() as u32;
                 append(mesh, local, &instance.scene_from_mesh);
                 let triangles = first..mesh.indices.len() as u32;
-                mesh.parts.push(Part { name: name.to_owned(), triangles, material });
+                mesh.parts.push(Part { name: limits::name(name).to_owned(), triangles, material });
             }
         }
     }

@@ -7,10 +7,10 @@ use std::fmt::Write;
 
 use glam::DVec3;
 
-use super::polygon::triangulate;
+use super::polygon::{EAR_TESTS, triangulate};
 use super::text::{for_each_line, keyword, short};
 use crate::error::MeshError;
-use crate::limits::check_elements;
+use crate::limits::{self, check_elements};
 
 /// An OBJ in regular form.
 pub(super) struct Cleaned {
@@ -87,22 +87,20 @@ impl Cleaner<'_> {
                 let finite = u.is_finite() && v.is_finite();
                 self.bad_uvs += usize::from(!finite);
                 self.uvs += 1;
-                let _ =
-                    if finite { writeln!(self.data, "vt {u} {v}") } else { writeln!(self.data, "vt 0 0") };
+                // `v` may be left out.
+                self.copy("vt", if finite { [rest, "0"] } else { ["0 0", ""] }, 2);
             }
             "vn" => {
                 let [x, y, z] = self.numbers(number, rest, 3)?;
                 self.normals += 1;
                 // Exporters write NaN normals for faces without area; those are made anew.
-                let _ = match DVec3::new(x.into(), y.into(), z.into()).try_normalize() {
-                    Some(n) => writeln!(self.data, "vn {} {} {}", n.x, n.y, n.z),
-                    None => writeln!(self.data, "vn 0 0 0"),
-                };
+                let finite = x.is_finite() && y.is_finite() && z.is_finite();
+                self.copy("vn", [if finite { rest } else { "0 0 0" }, ""], 3);
             }
             "f" | "fo" => self.face(number, rest)?,
             "p" | "l" => self.left_out += 1,
             "o" | "g" | "usemtl" if !rest.is_empty() || key != "usemtl" => {
-                self.items.push(Item::Group(format!("{key} {rest}\n")));
+                self.items.push(Item::Group(format!("{key} {}\n", limits::name(rest).trim_end())));
             }
             "mtllib" => self.libraries.push(rest.to_owned()),
             _ => {}
@@ -127,13 +125,23 @@ impl Cleaner<'_> {
         Ok(found)
     }
 
+    /// Writes a line of `count` words, which have been read before: writing numbers anew is slow.
+    fn copy(&mut self, key: &str, from: [&str; 2], count: usize) {
+        self.data.push_str(key);
+        for word in from.into_iter().flat_map(str::split_whitespace).take(count) {
+            self.data.push(' ');
+            self.data.push_str(word);
+        }
+        self.data.push('\n');
+    }
+
     fn position(&mut self, number: usize, rest: &str) -> Result<(), MeshError> {
         let mut point = DVec3::from(self.numbers(number, rest, 3)?.map(f64::from));
-        let words: Vec<&str> = rest.split_whitespace().skip(3).take(2).collect();
         // A fourth number alone is a weight; from five on, the others are a colour.
-        if let [weight] = words[..] {
-            let weight: f64 = weight.parse().unwrap_or(f64::NAN);
-            point /= weight;
+        let mut further = rest.split_whitespace().skip(3);
+        let weight = further.next().filter(|_| further.next().is_none());
+        if let Some(weight) = weight {
+            point /= weight.parse::<f64>().unwrap_or(f64::NAN);
         }
         let point = point.as_vec3();
         if !point.is_finite() {
@@ -141,7 +149,11 @@ impl Cleaner<'_> {
         }
         self.positions.push(point.as_dvec3());
         check_elements("OBJ positions", self.positions.len())?;
-        let _ = writeln!(self.data, "v {} {} {}", point.x, point.y, point.z);
+        if weight.is_some() {
+            let _ = writeln!(self.data, "v {} {} {}", point.x, point.y, point.z);
+        } else {
+            self.copy("v", [rest, ""], 3);
+        }
         Ok(())
     }
 
@@ -202,6 +214,7 @@ impl Cleaner<'_> {
     /// Writes groups and faces, once every index is known to be good.
     fn write(&mut self) {
         let mut rest = self.corners.as_slice();
+        let mut tests = EAR_TESTS;
         for item in &self.items {
             let count = match item {
                 Item::Group(line) => {
@@ -213,14 +226,14 @@ impl Cleaner<'_> {
             let (corners, after) = rest.split_at(count);
             rest = after;
             self.without_uv += usize::from(corners.iter().any(|c| c[1] == 0));
+            let corner = |i: usize| corners[i];
+            if count == 3 {
+                write_triangle(&mut self.faces, [0, 1, 2].map(corner));
+                continue;
+            }
             let outline: Vec<DVec3> = corners.iter().map(|c| self.positions[c[0] as usize - 1]).collect();
-            for triangle in triangulate(&outline) {
-                self.faces.push('f');
-                for [v, vt, vn] in triangle.map(|i| corners[i]) {
-                    // One past the zero entries in front.
-                    let _ = write!(self.faces, " {v}/{}/{}", vt + 1, vn + 1);
-                }
-                self.faces.push('\n');
+            for triangle in triangulate(&outline, &mut tests) {
+                write_triangle(&mut self.faces, triangle.map(corner));
             }
         }
     }
@@ -236,4 +249,10 @@ impl Cleaner<'_> {
             warnings.push(format!("{} faces have no texture coordinates; set to 0", self.without_uv));
         }
     }
+}
+
+fn write_triangle(out: &mut String, corners: [[u32; 3]; 3]) {
+    // UVs and normals count from one past the zero entries in front.
+    let [[a, s, l], [b, t, m], [c, u, n]] = corners.map(|[v, vt, vn]| [v, vt + 1, vn + 1]);
+    let _ = writeln!(out, "f {a}/{s}/{l} {b}/{t}/{m} {c}/{u}/{n}");
 }

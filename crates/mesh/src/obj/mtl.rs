@@ -8,7 +8,7 @@ use std::path::Path;
 use super::text::{decode, for_each_line, keyword, short};
 use super::texture;
 use crate::arrays::read_file;
-use crate::limits::MAX_MTL_BYTES;
+use crate::limits::{self, MAX_LIBRARIES, MAX_MTL_BYTES};
 use crate::material::{ImageSource, MaterialSource};
 
 /// All materials of all libraries.
@@ -30,6 +30,10 @@ pub(super) fn read_all(lines: &[String], folder: &Path, warnings: &mut Vec<Strin
         for name in names {
             if !done.insert(name) {
                 continue;
+            }
+            if done.len() > MAX_LIBRARIES {
+                warnings.push(format!("only the first {MAX_LIBRARIES} material libraries are read"));
+                return library;
             }
             match texture::find(folder, name) {
                 Some(path) => library.read(&path, name, warnings),
@@ -100,7 +104,7 @@ fn clean(text: &str, warn: &mut impl FnMut(String)) -> String {
                     bad("has no name; left out");
                     return Ok(());
                 }
-                writeln!(out, "newmtl {rest}")
+                writeln!(out, "newmtl {}", limits::name(rest).trim_end())
             }
             // What comes before the first name belongs to nothing.
             _ if !named => return Ok(()),

@@ -2,15 +2,15 @@
 
 use glam::{DVec2, DVec3};
 
-/// Concave polygons with more corners than this are split as fans: ear clipping takes quadratic
-/// time or worse, and nobody models such faces.
-const MAX_EARS: usize = 512;
+/// Corners tested for lying inside an ear, over a whole file, before further concave polygons are
+/// split as fans. Ear clipping takes up to cubic time; real models need a few tests a corner.
+pub(super) const EAR_TESTS: u64 = 1_000_000_000;
 
 /// Triangles over the corners of a polygon: a fan from the first corner when it is convex, as other
-/// readers do, else by clipping ears (Meisters 1975).
-pub(super) fn triangulate(outline: &[DVec3]) -> Vec<[usize; 3]> {
+/// readers do, else by clipping ears (Meisters 1975) while `tests` last.
+pub(super) fn triangulate(outline: &[DVec3], tests: &mut u64) -> Vec<[usize; 3]> {
     let fan = || (2..outline.len()).map(|i| [0, i - 1, i]).collect();
-    if outline.len() <= 3 || outline.len() > MAX_EARS {
+    if outline.len() <= 3 {
         return fan();
     }
     let flat = project(outline);
@@ -21,12 +21,16 @@ pub(super) fn triangulate(outline: &[DVec3]) -> Vec<[usize; 3]> {
     let mut left: Vec<usize> = (0..count).collect();
     let mut triangles = Vec::with_capacity(count - 2);
     while left.len() > 3 {
-        let Some(at) = (0..left.len()).find(|&at| is_ear(&flat, &left, at)) else { break };
+        let ear = |&at: &usize| {
+            *tests = tests.saturating_sub(left.len() as u64);
+            *tests > 0 && is_ear(&flat, &left, at)
+        };
+        let Some(at) = (0..left.len()).find(ear) else { break };
         let n = left.len();
         triangles.push([left[(at + n - 1) % n], left[at], left[(at + 1) % n]]);
         left.remove(at);
     }
-    // Outlines that cross themselves may run out of ears: the rest becomes a fan.
+    // Outlines that cross themselves run out of ears: the rest becomes a fan.
     triangles.extend((2..left.len()).map(|i| [left[0], left[i - 1], left[i]]));
     triangles
 }
@@ -70,7 +74,7 @@ mod tests {
     #[test]
     fn convex_polygons_are_fans() {
         let square = [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y];
-        assert_eq!(triangulate(&square), vec![[0, 1, 2], [0, 2, 3]]);
+        assert_eq!(triangulate(&square, &mut 9), vec![[0, 1, 2], [0, 2, 3]]);
     }
 
     #[test]
@@ -81,14 +85,15 @@ mod tests {
         for shift in 0..5 {
             let mut turned = outline;
             turned.rotate_left(shift);
-            assert!((area(&turned, &triangulate(&turned)) - 10.0).abs() < 1e-12, "shift {shift}");
+            assert!((area(&turned, &triangulate(&turned, &mut 999)) - 10.0).abs() < 1e-12, "shift {shift}");
         }
     }
 
     #[test]
     fn senseless_polygons_still_end() {
         for outline in [vec![DVec3::ZERO; 9], (0..9).map(|i| DVec3::X * f64::from(i % 3)).collect()] {
-            assert_eq!(triangulate(&outline).len(), 7);
+            assert_eq!(triangulate(&outline, &mut 999).len(), 7);
+            assert_eq!(triangulate(&outline, &mut 5).len(), 7);
         }
     }
 }
