@@ -1,7 +1,7 @@
 //! Maps from height fields, and the image files they come from and go to.
 //!
 //! Data flows one way: [`files`] -> `heightfield::HeightField` -> [`slopes`] -> the maps
-//! ([`normal`], [`relief`], [`pyramid`]) -> [`encode`] -> [`files`]. [`maps`] lists all maps by name
+//! ([`normal`], [`relief`], [`mod@pyramid`]) -> [`encode`] -> [`files`]. [`maps`] lists all maps by name
 //! and drives them; a new map is one file here and one entry there.
 //!
 //! Conventions: row 0 is the top, `u` runs right and `v` down. Baked maps are `f32`: normals in
