@@ -81,7 +81,7 @@ class HeightMap:
     --------
     >>> import numpy as np
     >>> import bumpwgpu as bw
-    >>> hm = bw.HeightMap(np.array([[0, 128], [128, 255]], np.uint8), scale=0.05)
+    >>> hm = bw.HeightMap(np.array([[0, 100], [131, 255]], np.uint8), scale=0.05)
     >>> hm.shape, hm.bits, float(hm.array[1, 1])
     ((2, 2), 8, 1.0)
     """
@@ -462,6 +462,8 @@ def _effective_bits(plane: NDArray[Any]) -> int:
     if plane.dtype == np.uint8 or plane.dtype == np.uint16:
         return int(_bumpwgpu.effective_bits(np.ascontiguousarray(plane)))
     if kind == "f":
-        return int(_bumpwgpu.effective_bits(np.ascontiguousarray(plane, dtype=np.float32)))
+        with np.errstate(over="ignore"):
+            narrow = np.ascontiguousarray(plane, dtype=np.float32)
+        return int(_bumpwgpu.effective_bits(narrow))
     levels = int(plane.max()) - int(plane.min())
     return max(1, levels.bit_length())

@@ -383,7 +383,8 @@ class Mesh:
     @property
     def bounds(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
         """Smallest and largest corner of the bounding box, mesh units."""
-        return self._core.bounds
+        (x0, y0, z0), (x1, y1, z1) = self._core.bounds
+        return (x0, y0, z0), (x1, y1, z1)
 
     def tangents(self, method: str = "mikktspace") -> Tangents:
         """Tangent frames by some method; the mesh itself stays as it is.
