@@ -239,7 +239,7 @@ def test_senseless_questions_are_refused(result: bw.CompareResult, call: Any, er
         ({"elevations": [91]}, ValueError, "at most 90"),
         ({"elevations": [float("nan")]}, ValueError, "elevations"),
         ({"elevations": ["steep"]}, TypeError, "elevations"),
-        ({"elevations": [1e-7]}, ValueError, "tiles"),
+        ({"elevations": [1e-7]}, ValueError, "texels"),
         ({"rays": 0}, ValueError, "rays"),
         ({"rays": 1.5}, TypeError, "rays"),
         ({"repeats": 0}, ValueError, "repeats"),

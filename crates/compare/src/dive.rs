@@ -8,23 +8,29 @@ use heightfield::HeightField;
 pub const DIVE_DEPTH: f64 = 1.0e-4;
 
 /// Ray parameter at which the ray comes out of its first dive deeper than [`DIVE_DEPTH`] after
-/// `t_hit`; infinite when it stays below until `z = 0`.
+/// `t_hit`; infinite when it stays below until `t_stop` or `z = 0`.
 ///
 /// A search that reports a hit beyond this point jumped over everything in between. The walk goes
 /// cell by cell in `f64`, for any texture-space direction that goes down; along a straight line the
 /// bilinear patch of a cell is a quadratic, fixed by its values at the ends and the middle.
-pub fn end_of_first_dive(field: &HeightField, origin: [f64; 3], direction: [f64; 3], t_hit: f64) -> f64 {
+pub fn end_of_first_dive(
+    field: &HeightField,
+    origin: [f64; 3],
+    direction: [f64; 3],
+    t_hit: f64,
+    t_stop: f64,
+) -> f64 {
     let [_, _, dz] = direction;
     if !t_hit.is_finite() || dz >= 0.0 {
         return f64::INFINITY;
     }
-    let t_floor = -origin[2] / dz;
+    let t_stop = t_stop.min(-origin[2] / dz);
     let x = Axis::new(origin[0], direction[0], field.width());
     let y = Axis::new(origin[1], direction[1], field.height());
     let mut t = t_hit;
     let mut deep = false;
-    while t < t_floor {
-        let end = x.next_line(t).min(y.next_line(t)).min(t_floor);
+    while t < t_stop {
+        let end = x.next_line(t).min(y.next_line(t)).min(t_stop);
         let middle = 0.5 * (t + end);
         let patch = Patch::new(field, x.at(middle).floor(), y.at(middle).floor());
         let gap = |t: f64| dz.mul_add(t, origin[2]) - patch.height(x.at(t), y.at(t));
@@ -144,20 +150,22 @@ mod tests {
         let origin = [7.0 / 16.0, 0.4, 0.5 + rate];
         let direction = [1.0 / 16.0, 0.0, -rate];
         let t_hit = 1.0 / (1.0 + rate) * (0.5 + rate);
-        let t = end_of_first_dive(&field, origin, direction, t_hit);
+        let t = end_of_first_dive(&field, origin, direction, t_hit, f64::INFINITY);
         let (x, z) = (6.5 + t, origin[2] + direction[2] * t);
         assert!((9.0 - x - z).abs() < 1e-9, "x {x}, z {z}");
+        let stopped = end_of_first_dive(&field, origin, direction, t_hit, t - 0.01);
+        assert_eq!(stopped, f64::INFINITY, "not out by then");
     }
 
     #[test]
     fn a_ray_that_stays_below_never_comes_out() {
         let field = HeightField::new(&[0.5; 16], 4, 4, Wrap::Repeat).unwrap();
-        assert_eq!(end_of_first_dive(&field, [0.2, 0.3, 1.0], [0.4, -0.3, -1.0], 0.5), f64::INFINITY);
-        assert_eq!(end_of_first_dive(&field, [0.2, 0.3, 1.0], [0.0, 0.0, -1.0], 0.5), f64::INFINITY);
-        assert_eq!(
-            end_of_first_dive(&field, [0.2, 0.3, 1.0], [0.4, 0.0, -1.0], f64::INFINITY),
-            f64::INFINITY
-        );
+        let end = |direction: [f64; 3], t_hit: f64| {
+            end_of_first_dive(&field, [0.2, 0.3, 1.0], direction, t_hit, f64::INFINITY)
+        };
+        assert_eq!(end([0.4, -0.3, -1.0], 0.5), f64::INFINITY);
+        assert_eq!(end([0.0, 0.0, -1.0], 0.5), f64::INFINITY);
+        assert_eq!(end([0.4, 0.0, -1.0], f64::INFINITY), f64::INFINITY);
     }
 
     #[test]
@@ -167,7 +175,7 @@ mod tests {
         let origin = [7.5 / 16.0, 0.4, 1.0 - 0.25 * DIVE_DEPTH];
         let direction = [1.0 / 16.0, 0.0, -0.1 * DIVE_DEPTH];
         let t_touch = 1.0 - 0.5 * DIVE_DEPTH;
-        let t = end_of_first_dive(&field, origin, direction, t_touch);
+        let t = end_of_first_dive(&field, origin, direction, t_touch, f64::INFINITY);
         assert!((t - 17.0).abs() < 0.01, "{t}");
     }
 
@@ -196,7 +204,7 @@ mod tests {
                     deepest = deepest.min(g);
                     g > 0.0 && deepest < -DIVE_DEPTH
                 });
-                let t = end_of_first_dive(&field, origin, direction, sample(first));
+                let t = end_of_first_dive(&field, origin, direction, sample(first), f64::INFINITY);
                 match out {
                     Some(k) => assert!((t - sample(k)).abs() < 2.0 / n as f64, "{t} against {}", sample(k)),
                     // Samples can jump over a gap that the walk sees.

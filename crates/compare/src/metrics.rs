@@ -16,6 +16,7 @@
 use heightfield::{HeightField, Status, Wrap};
 use rayon::prelude::*;
 
+use crate::dive::end_of_first_dive;
 use crate::{CompareError, Rays, Reference, reference};
 
 /// Height above the surface (0..1) from which a hit short of the true one is a false hit: 1 % of the
@@ -175,7 +176,8 @@ fn measure_ray(
         (same_tile(field.wrap(), uv[axis], at[axis]) - truth.uv[axis]) * size[axis]
     });
     let slack = T_SLACK * truth.t.abs().max(t.abs());
-    let outcome = if t > truth.t_dive_end + slack {
+    let skipped = |t_hit| end_of_first_dive(field, origin, direction, t_hit, t) < t - slack;
+    let outcome = if t > truth.t + slack && skipped(truth.t) {
         Outcome::Missed
     } else if t < truth.t && at[2] - field.height_at(at[0], at[1]) > FALSE_HIT_GAP {
         Outcome::FalseHit

@@ -1,12 +1,12 @@
 //! Seeded rays: the same seed gives the same rays on every machine.
 
-use heightfield::Extent;
+use heightfield::{Extent, HeightField};
 
 use crate::CompareError;
 
-/// Most tiles that a ray may cross between the lid and the floor. Flatter rays say nothing about a
+/// Most texels that a ray may cross between the lid and the floor. Flatter rays say nothing about a
 /// technique: all of them run out of steps there.
-pub const MAX_TILES: f64 = 1.0e4;
+pub const MAX_TEXELS: f64 = 131_072.0;
 
 /// Rays in texture space, stored in `f32` so that CPU, device and reference start from equal numbers.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -94,10 +94,15 @@ pub fn lateral_per_height(extent: &Extent, azimuth_rad: f64, elevation_deg: f64)
 ///
 /// # Errors
 /// [`CompareError::Setting`] unless `0 < elevation_deg <= 90` and a ray crosses at most
-/// [`MAX_TILES`] tiles, and for no rays at all.
-pub fn planar(extent: &Extent, elevation_deg: f64, count: usize, seed: u64) -> Result<Rays, CompareError> {
-    extent.validate()?;
-    check_elevation(extent, elevation_deg)?;
+/// [`MAX_TEXELS`] texels, and for no rays at all.
+pub fn planar(
+    field: &HeightField,
+    elevation_deg: f64,
+    count: usize,
+    seed: u64,
+) -> Result<Rays, CompareError> {
+    check_elevation(field, elevation_deg)?;
+    let extent = field.extent();
     if count == 0 {
         return Err(CompareError::setting("rays", 0, "at least one ray is needed"));
     }
@@ -111,7 +116,7 @@ pub fn planar(extent: &Extent, elevation_deg: f64, count: usize, seed: u64) -> R
     Ok(rays)
 }
 
-fn check_elevation(extent: &Extent, elevation_deg: f64) -> Result<(), CompareError> {
+fn check_elevation(field: &HeightField, elevation_deg: f64) -> Result<(), CompareError> {
     if !(elevation_deg > 0.0 && elevation_deg <= 90.0) {
         return Err(CompareError::setting(
             "elevation",
@@ -119,15 +124,15 @@ fn check_elevation(extent: &Extent, elevation_deg: f64) -> Result<(), CompareErr
             "it must be above 0 and at most 90 degrees",
         ));
     }
-    let [u, _] = lateral_per_height(extent, 0.0, elevation_deg);
-    let [_, v] = lateral_per_height(extent, std::f64::consts::FRAC_PI_2, elevation_deg);
-    let tiles = u.abs().max(v.abs());
-    if tiles > MAX_TILES {
+    let [u, _] = lateral_per_height(field.extent(), 0.0, elevation_deg);
+    let [_, v] = lateral_per_height(field.extent(), std::f64::consts::FRAC_PI_2, elevation_deg);
+    let texels = (u * field.width() as f64).max(v * field.height() as f64);
+    if texels > MAX_TEXELS {
         return Err(CompareError::setting(
             "elevation",
             elevation_deg,
             format!(
-                "with this scale and tile size a ray would cross {tiles:.3e} tiles; at most {MAX_TILES:.0e}"
+                "with this scale and tile size a ray would cross {texels:.3e} texels; at most {MAX_TEXELS:.0}"
             ),
         ));
     }
@@ -147,11 +152,16 @@ pub fn lights(extent: &Extent, seed: u64) -> [[f64; 3]; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use heightfield::Wrap;
+
+    fn flat(extent: Extent) -> HeightField {
+        HeightField::new(&[0.5; 4], 2, 2, Wrap::Repeat).unwrap().with_extent(extent).unwrap()
+    }
 
     #[test]
     fn elevation_is_measured_in_mesh_units() {
         let extent = Extent { scale: 0.25, base: 1.0, tile_size: [2.0, 0.5] };
-        let rays = planar(&extent, 20.0, 500, 7).unwrap();
+        let rays = planar(&flat(extent), 20.0, 500, 7).unwrap();
         for i in 0..rays.len() {
             let [u, v, z] = rays.direction(i);
             let lateral = (u * 2.0).hypot(v * 0.5);
@@ -165,18 +175,18 @@ mod tests {
 
     #[test]
     fn the_seed_fixes_the_rays() {
-        let extent = Extent::default();
-        assert_eq!(planar(&extent, 10.0, 64, 1).unwrap(), planar(&extent, 10.0, 64, 1).unwrap());
-        assert_ne!(planar(&extent, 10.0, 64, 1).unwrap(), planar(&extent, 10.0, 64, 2).unwrap());
+        let field = flat(Extent::default());
+        assert_eq!(planar(&field, 10.0, 64, 1).unwrap(), planar(&field, 10.0, 64, 1).unwrap());
+        assert_ne!(planar(&field, 10.0, 64, 1).unwrap(), planar(&field, 10.0, 64, 2).unwrap());
         assert_ne!(
-            planar(&extent, 10.0, 64, 1).unwrap().origins,
-            planar(&extent, 20.0, 64, 1).unwrap().origins
+            planar(&field, 10.0, 64, 1).unwrap().origins,
+            planar(&field, 20.0, 64, 1).unwrap().origins
         );
     }
 
     #[test]
     fn origins_cover_the_tile_evenly() {
-        let rays = planar(&Extent::default(), 90.0, 10_000, 3).unwrap();
+        let rays = planar(&flat(Extent::default()), 90.0, 10_000, 3).unwrap();
         let mean: f32 = rays.origins.chunks(3).map(|o| o[0] + o[1]).sum::<f32>() / 1e4;
         assert!((mean - 1.0).abs() < 0.02, "{mean}");
         assert!(rays.origins.chunks(3).all(|o| (0.0..=1.0).contains(&o[0]) && o[2] == 1.0));
@@ -186,17 +196,18 @@ mod tests {
     #[test]
     fn a_relief_without_height_is_met_straight_below() {
         let extent = Extent { scale: 0.0, ..Extent::default() };
-        let rays = planar(&extent, 5.0, 4, 3).unwrap();
+        let rays = planar(&flat(extent), 5.0, 4, 3).unwrap();
         assert!(rays.directions.chunks(3).all(|d| d == [0.0, 0.0, -1.0]));
     }
 
     #[test]
     fn senseless_settings_are_refused() {
-        let extent = Extent::default();
+        let field = flat(Extent::default());
         for elevation in [0.0, -5.0, 90.1, f64::NAN, 1e-9] {
-            assert!(planar(&extent, elevation, 4, 3).is_err(), "{elevation}");
+            assert!(planar(&field, elevation, 4, 3).is_err(), "{elevation}");
         }
-        assert!(planar(&extent, 45.0, 0, 3).is_err());
-        assert!(planar(&Extent { scale: f32::NAN, ..extent }, 45.0, 1, 3).is_err());
+        assert!(planar(&field, 45.0, 0, 3).is_err());
+        let deep = flat(Extent { scale: 1e6, ..Extent::default() });
+        assert!(planar(&deep, 5.0, 4, 3).is_err());
     }
 }

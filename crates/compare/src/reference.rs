@@ -5,7 +5,6 @@ use heightfield::{Extent, HeightField, Status, oracle};
 use rayon::prelude::*;
 
 use crate::Rays;
-use crate::dive::end_of_first_dive;
 
 /// The exact answer for one ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,8 +19,6 @@ pub struct Truth {
     pub z: f64,
     /// Unit normal in mesh units, tangent space: x right, y up the image, z out.
     pub normal: [f64; 3],
-    /// Where the ray comes up again; see [`end_of_first_dive`].
-    pub t_dive_end: f64,
 }
 
 /// A ray from a true hit towards a light.
@@ -83,14 +80,7 @@ pub fn normal(extent: &Extent, gradient: [f64; 2]) -> [f64; 3] {
 }
 
 impl Truth {
-    const NONE: Self = Self {
-        hit: false,
-        t: f64::INFINITY,
-        uv: [0.0; 2],
-        z: 0.0,
-        normal: [0.0, 0.0, 1.0],
-        t_dive_end: f64::INFINITY,
-    };
+    const NONE: Self = Self { hit: false, t: f64::INFINITY, uv: [0.0; 2], z: 0.0, normal: [0.0, 0.0, 1.0] };
 
     fn of(field: &HeightField, rays: &Rays, i: usize) -> Self {
         let (origin, direction) = (rays.origin(i), rays.direction(i));
@@ -99,14 +89,7 @@ impl Truth {
             return Self::NONE;
         }
         let [u, v, z] = rays.at(i, found.t);
-        Self {
-            hit: true,
-            t: found.t,
-            uv: [u, v],
-            z,
-            normal: normal(field.extent(), found.gradient),
-            t_dive_end: end_of_first_dive(field, origin, direction, found.t),
-        }
+        Self { hit: true, t: found.t, uv: [u, v], z, normal: normal(field.extent(), found.gradient) }
     }
 }
 

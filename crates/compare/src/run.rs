@@ -91,7 +91,7 @@ pub fn compare(
     let mut cells: Vec<Vec<Cell>> = (0..settings).map(|_| Vec::with_capacity(elevations)).collect();
     for &elevation in &plan.elevations_deg {
         tell(&format!("exact surface at {elevation} degrees"), 1)?;
-        let set = rays::planar(field.extent(), elevation, plan.rays, plan.seed)?;
+        let set = rays::planar(field, elevation, plan.rays, plan.seed)?;
         let reference = Reference::new(field, &set, &lights);
         for (technique, row) in plan.techniques.iter().zip(&mut cells) {
             tell(&format!("errors of {technique} at {elevation} degrees"), 1)?;

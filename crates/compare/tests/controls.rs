@@ -53,7 +53,7 @@ fn metrics(field: &HeightField, set: &Rays, reference: &Reference, answer: &Answ
 }
 
 fn set(field: &HeightField, elevation: f64) -> (Rays, Reference) {
-    let set = rays::planar(field.extent(), elevation, 4000, 9).unwrap();
+    let set = rays::planar(field, elevation, 4000, 9).unwrap();
     let reference = Reference::new(field, &set, &rays::lights(field.extent(), 9));
     (set, reference)
 }
