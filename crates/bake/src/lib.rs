@@ -1,6 +1,6 @@
 //! Maps from height fields, and the image files they come from and go to.
 //!
-//! Data flows one way: [`files`] -> `heightfield::HeightField` -> [`slopes`] -> the maps
+//! Data flows one way: [`files`] -> `heightfield::HeightField` -> [`mod@slopes`] -> the maps
 //! ([`normal`], [`relief`], [`mod@pyramid`]) -> [`encode`] -> [`files`]. [`maps`] lists all maps by name
 //! and drives them; a new map is one file here and one entry there.
 //!
