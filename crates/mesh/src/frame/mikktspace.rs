@@ -14,14 +14,14 @@ use glam::{Vec3, Vec4};
 
 use super::{Surface, convention, dietrich};
 
-/// Pairs of faces sharing a vertex: a fixed allowance, and one for each triangle. A closed mesh
-/// needs about 18 a triangle.
+/// Pairs of faces that meet at a position: a fixed allowance, and one for each triangle. A closed
+/// mesh of triangles needs about 18 each.
 const PAIRS: u64 = 100_000_000;
 const PAIRS_PER_TRIANGLE: u64 = 100;
 
 /// Faces around one vertex that the caller's stack is trusted with.
 const SHALLOW: u64 = 256;
-/// Stack for each face around a vertex; a level of recursion takes about a quarter of it.
+/// Stack for each face around a vertex. An optimised build was seen to need under 170 bytes.
 const STACK_PER_FACE: u64 = 1024;
 
 const NONE: u32 = u32::MAX;
