@@ -26,7 +26,8 @@ device: ## install a software Vulkan device when none answers
 	@.ci/device
 
 extension: setup ## compile the package into .venv (release build)
-	@.venv/bin/maturin develop --release --quiet --extras plot,compare
+	@echo "Compiling: some minutes the first time, seconds after that."
+	@PIP_QUIET=1 .venv/bin/maturin develop --release --extras plot,compare
 
 demo: setup device extension ## bake, render and compare real input; writes demo_output/
 	@$(PY) examples/demo.py --output demo_output
