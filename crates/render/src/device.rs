@@ -182,3 +182,47 @@ impl Device {
         if got > limit { Err(RenderError::Limit { what, got, limit }) } else { Ok(()) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lost_device_is_an_error_and_then_replaced() {
+        let first = match device() {
+            Ok(device) => device,
+            Err(error) => {
+                assert!(std::env::var("BUMPWGPU_REQUIRE_GPU").as_deref() != Ok("1"), "{error}");
+                return;
+            }
+        };
+        assert!(Arc::ptr_eq(&first, &device().unwrap()));
+        first.device.destroy();
+        let result = first.buffer_with("test", &[0; 16], wgpu::BufferUsages::UNIFORM);
+        assert!(matches!(result, Err(RenderError::DeviceLost(_) | RenderError::Device { .. })), "{result:?}");
+        let _ = first.wait("test");
+        let second = device().unwrap();
+        assert!(!Arc::ptr_eq(&first, &second), "the lost device was handed out again");
+        assert!(second.buffer_with("test", &[0; 16], wgpu::BufferUsages::UNIFORM).is_ok());
+    }
+
+    #[test]
+    fn complaints_become_errors_inside_and_outside_of_a_guard() {
+        let Ok(device) = Device::open(&DeviceOptions::default()) else { return };
+        let nonsense = || {
+            device.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: None,
+                source: wgpu::ShaderSource::Wgsl("fn f() -> f32 { return 1u; }".into()),
+            })
+        };
+        let inside = device.guard("testing", || {
+            nonsense();
+            Ok(())
+        });
+        assert!(matches!(inside, Err(RenderError::Device { during: "testing", .. })), "{inside:?}");
+        // Outside of a guard wgpu would panic; here the next guard reports it.
+        nonsense();
+        assert!(device.guard("testing", || Ok(())).is_err());
+        assert!(device.guard("testing", || Ok(())).is_ok());
+    }
+}
