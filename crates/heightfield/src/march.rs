@@ -147,6 +147,7 @@ pub struct Chunk<'a> {
     origins: RayArray<'a>,
     directions: RayArray<'a>,
     from_surface: bool,
+    cancel: Option<&'a AtomicBool>,
     t: Option<&'a mut [f32]>,
     uv: Option<&'a mut [f32]>,
     z: Option<&'a mut [f32]>,
@@ -156,6 +157,12 @@ pub struct Chunk<'a> {
 }
 
 impl Chunk<'_> {
+    /// Whether the caller asked to stop. A ray may take milliseconds, so each asks anew.
+    #[inline]
+    fn cancelled(&self) -> bool {
+        self.cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed))
+    }
+
     #[inline]
     fn write(&mut self, i: usize, status: Status, t: f64, steps: u32, gradient: impl FnOnce() -> [f64; 2]) {
         let hit = status == Status::Hit;
@@ -208,6 +215,9 @@ pub fn period(wrap: Wrap) -> f64 {
 pub(crate) fn march_by_segments<S: Search>(search: &S, field: &HeightField, chunk: &mut Chunk<'_>) {
     let period = period(field.wrap());
     for i in 0..chunk.origins.len() {
+        if chunk.cancelled() {
+            return;
+        }
         let (origin, direction) = (chunk.origins.get(i), chunk.directions.get(i));
         let cos_theta = field.extent().cos_theta(direction);
         let Some(segment) = Segment::clip(origin, direction, cos_theta, period) else {
@@ -230,6 +240,9 @@ pub(crate) fn march_by_segments<S: Search>(search: &S, field: &HeightField, chun
 pub(crate) fn march_exact(field: &HeightField, chunk: &mut Chunk<'_>) {
     let pyramid = field.pyramid();
     for i in 0..chunk.origins.len() {
+        if chunk.cancelled() {
+            return;
+        }
         let (origin, direction) = (chunk.origins.get(i), chunk.directions.get(i));
         let (hit, t) = exact_hit(field, pyramid, origin, direction, chunk.from_surface);
         chunk.write(i, hit.status, t, hit.steps, || {
@@ -301,6 +314,7 @@ pub fn march(
                 origins: origins.slice(from, to),
                 directions: directions.slice(from, to),
                 from_surface: options.from_surface,
+                cancel: options.cancel,
                 t: t.as_mut().and_then(Iterator::next),
                 uv: uv.as_mut().and_then(Iterator::next),
                 z: z.as_mut().and_then(Iterator::next),
@@ -311,11 +325,8 @@ pub fn march(
         })
         .collect();
     chunks.into_par_iter().try_for_each(|mut chunk| {
-        if options.cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed)) {
-            return Err(HeightFieldError::Interrupted);
-        }
         (technique.info.march)(field, &technique.values, &mut chunk);
-        Ok(())
+        if chunk.cancelled() { Err(HeightFieldError::Interrupted) } else { Ok(()) }
     })?;
     Ok(hits)
 }

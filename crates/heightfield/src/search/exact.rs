@@ -27,8 +27,9 @@ technique! {
 
 /// Most nodes visited in `f32`, as on the device; then the search gives up as unconverged.
 pub const MAX_STEPS_F32: u32 = 1 << 14;
-/// Most nodes visited in `f64`.
-pub const MAX_STEPS_F64: u32 = 1 << 26;
+/// Most nodes visited in `f64`: some hundred thousand tiles for a nearly horizontal ray, and still no
+/// more than milliseconds, so that a batch of hopeless rays comes to an end.
+pub const MAX_STEPS_F64: u32 = 1 << 20;
 
 /// A ray in cell space: x and y in cells from the first, z the height.
 #[derive(Debug, Clone, Copy)]
