@@ -33,7 +33,8 @@ pub struct Stats {
     pub prepare_ms: f64,
     /// Composing and compiling pipelines.
     pub compile_ms: f64,
-    /// Drawing: on the device's own clock where it has one, else from submission to completion.
+    /// Drawing: on the device's own clock where it has one, else from submission to completion. Some
+    /// drivers compile a program when it is first drawn with, so the first picture may take longer.
     pub draw_ms: f64,
     /// Whether `draw_ms` is from the device's clock.
     pub device_clock: bool,

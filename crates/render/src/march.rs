@@ -22,7 +22,8 @@ const WORKGROUP: u32 = 64;
 pub struct DeviceHits {
     /// All results, as `heightfield::march` returns them.
     pub hits: Hits,
-    /// Time on the device's clock, or of the submissions where it has none.
+    /// Time on the device's clock, or of the submissions where it has none. Some drivers compile a
+    /// program when it first runs, so the first call with a technique may take longer.
     pub device_seconds: f64,
 }
 
