@@ -166,11 +166,11 @@ def contact_sheet(rows: dict[str, list[tuple[str, Path]]], path: Path, cell: int
     sheet.save(path)
 
 
-def material(subject: Subject) -> bw.Material:
+def material(subject: Subject, specular: float = 0.15) -> bw.Material:
     """Height and colour; a renderer needs no more, every other map is baked from them."""
     scale = subject.height.scale * (1.0 if subject.tiles else EXAGGERATION)
     return bw.Material(
-        height=subject.height.replace(scale=scale), albedo=subject.albedo, specular=0.15, shininess=24.0
+        height=subject.height.replace(scale=scale), albedo=subject.albedo, specular=specular, shininess=24.0
     )
 
 
@@ -184,17 +184,18 @@ def bake(subject: Subject, folder: Path, step: Step) -> None:
 def draw(subject: Subject, folder: Path, step: Step) -> None:
     """Each mesh with each technique, and the contact sheet."""
     (folder / "pictures").mkdir(exist_ok=True)
-    surface = material(subject)
+    surface, matt = material(subject), material(subject, specular=0.0)
     for name, view in views(subject).items():
         row = subject.pictures.setdefault(name, [])
         for technique in TECHNIQUES:
             step(f"{subject.name}: {name}, {technique}", 0)
+            # The fixed-function hardware that dot3 models had one light and no highlight.
+            used, lights = (matt, view.lights[:1]) if technique == "dot3" else (surface, view.lights)
             frame = bw.render(
-                view.mesh, surface, camera=view.camera, lights=view.lights, technique=technique, size=SIZE
+                view.mesh, used, camera=view.camera, lights=lights, technique=technique, size=SIZE
             )
-            row.append(
-                (technique, frame.save(folder / "pictures" / f"{subject.name}_{name}_{technique}.png"))
-            )
+            path = folder / "pictures" / f"{subject.name}_{name}_{technique}.png"
+            row.append((technique, frame.save(path)))
             step(f"{subject.name}: {name}, {technique}", 1)
     contact_sheet(subject.pictures, folder / f"{subject.name}_pictures.png")
 
