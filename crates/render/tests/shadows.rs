@@ -20,7 +20,8 @@ fn shadow_bits_agree_with_the_oracle() {
     let Some(device) = common::device() else { return };
     let mesh = Mesh::quad(1.0).unwrap();
     let plateau = |u: f64, v: f64| if (u - 0.5).abs() < 0.2 && (v - 0.4).abs() < 0.1 { 1.0 } else { 0.2 };
-    let maps: [(&str, fn(f64, f64) -> f64); 3] = [("fbm", fbm), ("ridges", ridges), ("plateau", plateau)];
+    type Map = fn(f64, f64) -> f64;
+    let maps: [(&str, Map); 3] = [("fbm", fbm), ("ridges", ridges), ("plateau", plateau)];
     for (name, map) in maps {
         for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
             let extent = Extent { scale: 0.15, base: 1.0, tile_size: [1.0; 2] };
