@@ -81,9 +81,9 @@ class HeightMap:
     --------
     >>> import numpy as np
     >>> import bumpwgpu as bw
-    >>> hm = bw.HeightMap(np.array([[0, 100], [131, 255]], np.uint8), scale=0.05)
-    >>> hm.shape, hm.bits, float(hm.array[1, 1])
-    ((2, 2), 8, 1.0)
+    >>> hm = bw.HeightMap(np.arange(256, dtype=np.uint8).reshape(16, 16), scale=0.05)
+    >>> hm.shape, hm.bits, float(hm.array[15, 15])
+    ((16, 16), 8, 1.0)
     """
 
     __slots__ = ("_array", "_base", "_bits", "_field", "_scale", "_tile_size", "_wrap")

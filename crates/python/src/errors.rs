@@ -3,9 +3,7 @@
 use bake::BakeError;
 use heightfield::HeightFieldError;
 use mesh::MeshError;
-use pyo3::exceptions::{
-    PyFileNotFoundError, PyIsADirectoryError, PyPermissionError, PyValueError,
-};
+use pyo3::exceptions::{PyFileNotFoundError, PyIsADirectoryError, PyPermissionError, PyValueError};
 use pyo3::prelude::*;
 use render::RenderError;
 
@@ -14,10 +12,25 @@ pub mod classes {
     use pyo3::create_exception;
     use pyo3::exceptions::PyException;
 
-    create_exception!(bumpwgpu, BumpError, PyException, "Base class of everything bumpwgpu raises on its own account.");
+    create_exception!(
+        bumpwgpu,
+        BumpError,
+        PyException,
+        "Base class of everything bumpwgpu raises on its own account."
+    );
     create_exception!(bumpwgpu, MeshError, BumpError, "A mesh cannot be read, built or used.");
-    create_exception!(bumpwgpu, BakeError, BumpError, "An image cannot be read or written, or a map cannot be baked.");
-    create_exception!(bumpwgpu, RenderError, BumpError, "There is no Vulkan device, or it cannot draw what was asked.");
+    create_exception!(
+        bumpwgpu,
+        BakeError,
+        BumpError,
+        "An image cannot be read or written, or a map cannot be baked."
+    );
+    create_exception!(
+        bumpwgpu,
+        RenderError,
+        BumpError,
+        "There is no Vulkan device, or it cannot draw what was asked."
+    );
     create_exception!(bumpwgpu, CompareError, BumpError, "A comparison cannot be made.");
 }
 

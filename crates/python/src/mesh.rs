@@ -24,10 +24,7 @@ impl PyMesh {
         Arc::clone(&self.inner)
     }
 
-    fn build(
-        py: Python<'_>,
-        make: impl FnOnce() -> Result<mesh::Mesh, MeshError> + Send,
-    ) -> PyResult<Self> {
+    fn build(py: Python<'_>, make: impl FnOnce() -> Result<mesh::Mesh, MeshError> + Send) -> PyResult<Self> {
         Ok(Self { inner: Arc::new(run(py, None, |_| make())?) })
     }
 }
@@ -192,7 +189,9 @@ impl PyMesh {
     #[getter]
     fn parts(&self) -> Vec<(String, u32, u32, Option<usize>)> {
         let parts = self.inner.parts.iter();
-        parts.map(|part| (part.name.clone(), part.triangles.start, part.triangles.end, part.material)).collect()
+        parts
+            .map(|part| (part.name.clone(), part.triangles.start, part.triangles.end, part.material))
+            .collect()
     }
 
     /// The materials as the file describes them.

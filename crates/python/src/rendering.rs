@@ -39,12 +39,10 @@ impl PyMaterial {
         let image = |shape: &[usize], samples| {
             Image::new(shape[1], shape[0], shape[2], samples).map(Arc::new).map_err(Raise::raise)
         };
-        let albedo = albedo
-            .map(|array| image(array.shape(), Samples::U8(array.as_slice()?.to_vec())))
-            .transpose()?;
-        let normal = normal
-            .map(|array| image(array.shape(), Samples::F32(array.as_slice()?.to_vec())))
-            .transpose()?;
+        let albedo =
+            albedo.map(|array| image(array.shape(), Samples::U8(array.as_slice()?.to_vec()))).transpose()?;
+        let normal =
+            normal.map(|array| image(array.shape(), Samples::F32(array.as_slice()?.to_vec()))).transpose()?;
         Ok(Self {
             inner: Arc::new(render::Material {
                 albedo,

@@ -126,8 +126,7 @@ where
             });
             while finished.recv_timeout(POLL) == Err(RecvTimeoutError::Timeout) {
                 if stopped.is_none() {
-                    stopped =
-                        Python::attach(|py| task.poll(py, progress.as_ref(), &mut reported)).err();
+                    stopped = Python::attach(|py| task.poll(py, progress.as_ref(), &mut reported)).err();
                     if stopped.is_some() {
                         task.cancel.store(true, Ordering::Relaxed);
                     }
