@@ -83,7 +83,7 @@ def test_render(folder: Path) -> None:
     assert "draw_ms" in done.stdout
     camera = "--eye 0,-1,1 --target 0,0,0 --fov-y 30 --light 1,0,-1 --light=-1,0,-1 --size 32 32 --json"
     done = run("render", "height.png", *camera.split(), cwd=folder)
-    assert done.returncode == 0, done.stderr
+    assert (done.returncode, done.stderr) == (0, "")
     assert json.loads(done.stdout)["files"] == ["render.png"]
 
 
