@@ -21,9 +21,6 @@ Device: TypeAlias = Literal["cpu", "gpu", "auto"]
 #: Everything `march` can return.
 OUTPUTS = ("t", "uv", "z", "normal", "steps", "status")
 
-#: Values of `Hits.status`.
-HIT, LEFT, UNCONVERGED = 0, 1, 2
-
 
 class Hits:
     """What the rays met. Only the outputs that were asked for are there; the arrays are yours.

@@ -1,9 +1,9 @@
-//! Image files to and from NumPy arrays.
+//! Image files as NumPy arrays.
 
 use std::path::PathBuf;
 
 use bake::{BakeError, Image, Samples};
-use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray3, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
@@ -34,32 +34,6 @@ pub fn read_image(py: Python<'_>, path: PathBuf) -> PyResult<Decoded<'_>> {
 pub fn decode_image<'py>(py: Python<'py>, data: &[u8]) -> PyResult<Decoded<'py>> {
     let image = run(py, None, |_| bake::decode_image(data))?;
     decoded(py, image)
-}
-
-/// C-contiguous `(H, W, C)` samples of a type that files hold.
-#[derive(FromPyObject)]
-pub enum Pixels<'py> {
-    /// 8 bits.
-    U8(PyReadonlyArray3<'py, u8>),
-    /// 16 bits.
-    U16(PyReadonlyArray3<'py, u16>),
-    /// Floats.
-    F32(PyReadonlyArray3<'py, f32>),
-}
-
-/// Writes an image; the suffix of the path decides the format.
-#[pyfunction]
-pub fn write_image(py: Python<'_>, path: PathBuf, pixels: Pixels<'_>) -> PyResult<()> {
-    let (shape, samples) = match &pixels {
-        Pixels::U8(array) => (array.shape(), Samples::U8(array.as_slice()?.to_vec())),
-        Pixels::U16(array) => (array.shape(), Samples::U16(array.as_slice()?.to_vec())),
-        Pixels::F32(array) => (array.shape(), Samples::F32(array.as_slice()?.to_vec())),
-    };
-    let (height, width, channels) = (shape[0], shape[1], shape[2]);
-    run(py, None, |_| {
-        bake::write_image(&path, &Image::new(width, height, channels, samples)?)?;
-        Ok::<_, BakeError>(())
-    })
 }
 
 /// The number of bits really present in C-contiguous samples.

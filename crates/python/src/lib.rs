@@ -28,7 +28,7 @@ mod _bumpwgpu {
     #[pymodule_export]
     use crate::field::Field;
     #[pymodule_export]
-    use crate::images::{decode_image, effective_bits, read_image, write_image};
+    use crate::images::{decode_image, effective_bits, read_image};
     #[pymodule_export]
     use crate::march::{march, techniques};
     #[pymodule_export]

@@ -225,13 +225,6 @@ impl PyMesh {
             split.warnings,
         ))
     }
-
-    /// The same mesh with its frames replaced by another method's.
-    fn with_tangents(&self, py: Python<'_>, method: &str) -> PyResult<Self> {
-        let method = FrameMethod::named(method).map_err(Raise::raise)?;
-        let mesh = self.shared();
-        Self::build(py, || mesh.with_tangents(method))
-    }
 }
 
 /// Names of the tangent methods.
