@@ -8,6 +8,8 @@
 
 from __future__ import annotations
 
+import os as _os
+
 from . import techniques
 from ._bumpwgpu import VERSION as __version__
 from .baking import Maps, bake
@@ -19,6 +21,10 @@ from .meshes import Mesh, MeshMaterial, Part, Tangents
 from .rendering import Frame, render
 from .scene import Camera, Light, Material
 from .system import info
+
+if "XDG_RUNTIME_DIR" not in _os.environ:
+    # Without a desktop there is none to ask which device it uses; Mesa's layer would complain on stderr.
+    _os.environ.setdefault("NODEVICE_SELECT", "1")
 
 __all__ = [
     "BakeError",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
 import warnings
 from collections.abc import Callable, Iterator
@@ -579,7 +578,4 @@ def _root(
 
 def main() -> None:
     """Entry point of the command ``bumpwgpu``."""
-    if "XDG_RUNTIME_DIR" not in os.environ:
-        # Without a desktop there is none to ask which device it uses; Mesa would complain on stderr.
-        os.environ.setdefault("NODEVICE_SELECT", "1")
     app()
