@@ -135,7 +135,7 @@ def tiled(mesh: bw.Mesh, repeats: tuple[int, int]) -> bw.Mesh:
 def views(subject: Subject) -> dict[str, View]:
     """The three meshes; the quad is seen at a low angle under a low sun, where techniques differ most."""
     width, depth = subject.height.tile_size
-    sun = bw.Light.directional((0.75, -0.45, -0.5))
+    sun = bw.Light.directional((0.75, 0.3, -0.5))
     lamp = bw.Light.point((-1.6, 1.4, 1.6), intensity=2.5)
     above = bw.Light.directional((0.4, -0.8, -0.6), intensity=0.7)
     quad = bw.Mesh.quad((width, depth))
