@@ -43,8 +43,7 @@ test-rust: setup ## the Rust tests
 test-python: extension ## the Python tests but the slow ones
 	$(PY) -m pytest -m "not slow"
 
-test-slow: extension ## the slow tests, Rust and Python
-	$(CARGO_TEST) -- --ignored
+test-slow: extension ## the slow tests: the whole demo, the wheel out of the source distribution
 	$(PY) -m pytest -m slow
 
 wheel: setup ## one abi3 wheel and a source distribution in dist/
