@@ -21,7 +21,7 @@ pub enum Wrap {
 
 impl Wrap {
     /// The texel in `0..n` that index `i` stands for.
-    #[inline]
+    #[inline(always)]
     pub fn index(self, i: i64, n: usize) -> usize {
         let n = n as i64;
         let wrapped = match self {
@@ -76,7 +76,7 @@ impl Extent {
     ///
     /// Returns 0 for a horizontal direction and 1 for a vertical one; a relief without height is
     /// seen along its lateral extent only.
-    #[inline]
+    #[inline(always)]
     pub fn cos_theta(&self, direction: [f64; 3]) -> f32 {
         let x = direction[0] * f64::from(self.tile_size[0]);
         let y = direction[1] * f64::from(self.tile_size[1]);
@@ -149,7 +149,7 @@ impl HeightField {
     }
 
     /// The size of the relief in mesh units.
-    #[inline]
+    #[inline(always)]
     pub fn extent(&self) -> &Extent {
         &self.extent
     }
@@ -159,49 +159,49 @@ impl HeightField {
     }
 
     /// Texels across.
-    #[inline]
+    #[inline(always)]
     pub fn width(&self) -> usize {
         self.width
     }
 
     /// Texels down.
-    #[inline]
+    #[inline(always)]
     pub fn height(&self) -> usize {
         self.height
     }
 
     /// What lies beyond the edge.
-    #[inline]
+    #[inline(always)]
     pub fn wrap(&self) -> Wrap {
         self.wrap
     }
 
     /// Cells along x and y.
-    #[inline]
+    #[inline(always)]
     pub fn cells(&self) -> [usize; 2] {
         self.cells
     }
 
     /// Whether cell ids wrap around (`Repeat`, `Mirror`) or the border cells are endless (`Clamp`).
-    #[inline]
+    #[inline(always)]
     pub fn is_periodic(&self) -> bool {
         self.wrap != Wrap::Clamp
     }
 
     /// The texel whose centre is the left (upper) side of cell 0: 0, or -1 for `Clamp`.
-    #[inline]
+    #[inline(always)]
     pub fn first_texel(&self) -> i64 {
         Self::first_texel_of(self.wrap)
     }
 
     /// Corner heights, `(cells[0] + 1) * (cells[1] + 1)`, row by row.
-    #[inline]
+    #[inline(always)]
     pub fn corners(&self) -> &[f32] {
         &self.corners
     }
 
     /// The four corner heights of a cell: `[h00, h10, h01, h11]`, first digit along x.
-    #[inline]
+    #[inline(always)]
     pub fn cell(&self, i: usize, j: usize) -> [f32; 4] {
         let stride = self.cells[0] + 1;
         let at = j * stride + i;
@@ -209,7 +209,7 @@ impl HeightField {
     }
 
     /// The height of a texel, wrapped.
-    #[inline]
+    #[inline(always)]
     pub fn texel(&self, i: i64, j: i64) -> f32 {
         let first = self.first_texel();
         let x = (self.wrap.index(i, self.width) as i64 - first) as usize;
@@ -230,7 +230,7 @@ impl HeightField {
     }
 
     /// Cell and position inside it (0..1; any value in the endless cells of `Clamp`) along one axis.
-    #[inline]
+    #[inline(always)]
     fn locate(&self, coordinate: f64, texels: usize, cells: usize) -> (usize, f64) {
         let x = coordinate * texels as f64 - 0.5 - self.first_texel() as f64;
         let floor = x.floor();
@@ -245,7 +245,7 @@ impl HeightField {
     }
 
     /// Bilinear height at `(u, v)`, in 0..1.
-    #[inline]
+    #[inline(always)]
     pub fn height_at(&self, u: f64, v: f64) -> f64 {
         let (i, x) = self.locate(u, self.width, self.cells[0]);
         let (j, y) = self.locate(v, self.height, self.cells[1]);
@@ -256,7 +256,7 @@ impl HeightField {
     }
 
     /// Bilinear height at `(u, v)` in `f32`: the twin of WGSL `height_at`.
-    #[inline]
+    #[inline(always)]
     pub fn sample(&self, u: f32, v: f32) -> f32 {
         let (i, x) = self.locate_f32(u, self.width, self.cells[0]);
         let (j, y) = self.locate_f32(v, self.height, self.cells[1]);
@@ -266,18 +266,20 @@ impl HeightField {
         top + (bottom - top) * y
     }
 
-    #[inline]
+    #[inline(always)]
     fn locate_f32(&self, coordinate: f32, texels: usize, cells: usize) -> (usize, f32) {
         let x = coordinate * texels as f32 - 0.5 - self.first_texel() as f32;
         let last = (cells - 1) as f32;
         if self.is_periodic() {
             let floor = x.floor();
             let n = cells as f32;
-            let id = (floor - (floor / n).floor() * n).clamp(0.0, last);
-            (id as usize, x - floor)
+            // Half a cell keeps the quotient of whole numbers off whole numbers, so rounding is harmless.
+            let tile = ((floor + 0.5) * n.recip()).floor();
+            let id = (floor - tile * n).clamp(0.0, last);
+            (id as i32 as usize, x - floor)
         } else {
             let id = x.floor().clamp(0.0, last);
-            (id as usize, (x - id).clamp(0.0, 1.0))
+            (id as i32 as usize, (x - id).clamp(0.0, 1.0))
         }
     }
 
@@ -289,7 +291,7 @@ impl HeightField {
     }
 
     /// Gradient `(dh/du, dh/dv)` inside cell `(i, j)` at local position `(x, y)` in 0..1.
-    #[inline]
+    #[inline(always)]
     pub fn cell_gradient(&self, i: usize, j: usize, x: f64, y: f64) -> [f64; 2] {
         let [h00, h10, h01, h11] = self.cell(i, j).map(f64::from);
         let dx = (h10 - h00) * (1.0 - y) + (h11 - h01) * y;

@@ -24,7 +24,7 @@ pub enum RayArray<'a> {
 
 impl<'a> RayArray<'a> {
     /// Number of rays.
-    #[inline]
+    #[inline(always)]
     pub fn len(&self) -> usize {
         match self {
             Self::F32(a) => a.len() / 3,
@@ -33,13 +33,13 @@ impl<'a> RayArray<'a> {
     }
 
     /// Whether there are none.
-    #[inline]
+    #[inline(always)]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
     /// Ray `i`.
-    #[inline]
+    #[inline(always)]
     pub fn get(&self, i: usize) -> [f64; 3] {
         match self {
             Self::F32(a) => [a[3 * i], a[3 * i + 1], a[3 * i + 2]].map(f64::from),
@@ -78,7 +78,7 @@ impl OutputSet {
     pub const ALL: Self = Self(63);
 
     /// Whether all of `other` is in the set.
-    #[inline]
+    #[inline(always)]
     pub fn contains(self, other: Self) -> bool {
         self.0 & other.0 == other.0
     }
@@ -158,12 +158,12 @@ pub struct Chunk<'a> {
 
 impl Chunk<'_> {
     /// Whether the caller asked to stop. A ray may take milliseconds, so each asks anew.
-    #[inline]
+    #[inline(always)]
     fn cancelled(&self) -> bool {
         self.cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed))
     }
 
-    #[inline]
+    #[inline(always)]
     fn write(&mut self, i: usize, status: Status, t: f64, steps: u32, gradient: impl FnOnce() -> [f64; 2]) {
         let hit = status == Status::Hit;
         if let Some(out) = &mut self.t {
@@ -194,7 +194,7 @@ impl Chunk<'_> {
 }
 
 /// The unit normal `(-dh/du, -dh/dv, 1)` in texture space.
-#[inline]
+#[inline(always)]
 pub fn texture_space_normal(gradient: [f64; 2]) -> [f32; 3] {
     let [gu, gv] = gradient;
     let length = (gu * gu + gv * gv + 1.0).sqrt();
@@ -202,7 +202,7 @@ pub fn texture_space_normal(gradient: [f64; 2]) -> [f32; 3] {
 }
 
 /// Tiles after which the map repeats along an axis, 0 when it does not.
-#[inline]
+#[inline(always)]
 pub fn period(wrap: Wrap) -> f64 {
     match wrap {
         Wrap::Repeat => 1.0,
@@ -211,7 +211,31 @@ pub fn period(wrap: Wrap) -> f64 {
     }
 }
 
+/// Runs a search with the best instructions the processor has.
+///
+/// The code is the same and so are the results, bit for bit: wider instruction sets only bring cheap
+/// rounding and conversions. Everything below is inlined, so that it is compiled with them.
+pub(crate) fn dispatch<S: Search>(search: &S, field: &HeightField, chunk: &mut Chunk<'_>) {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
+        #[allow(unsafe_code)]
+        // SAFETY: the processor has the instructions, asked on the line above.
+        unsafe {
+            march_avx2(search, field, chunk);
+        }
+        return;
+    }
+    search.march(field, chunk);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn march_avx2<S: Search>(search: &S, field: &HeightField, chunk: &mut Chunk<'_>) {
+    search.march(field, chunk);
+}
+
 /// Runs a search on the `f32` segment of every ray.
+#[inline(always)]
 pub(crate) fn march_by_segments<S: Search>(search: &S, field: &HeightField, chunk: &mut Chunk<'_>) {
     let period = period(field.wrap());
     for i in 0..chunk.origins.len() {
@@ -237,6 +261,7 @@ pub(crate) fn march_by_segments<S: Search>(search: &S, field: &HeightField, chun
 }
 
 /// Runs the exact search in `f64` on every ray.
+#[inline(always)]
 pub(crate) fn march_exact(field: &HeightField, chunk: &mut Chunk<'_>) {
     let pyramid = field.pyramid();
     for i in 0..chunk.origins.len() {
@@ -252,7 +277,7 @@ pub(crate) fn march_exact(field: &HeightField, chunk: &mut Chunk<'_>) {
 }
 
 /// One ray in texture space through the exact search in `f64`: the hit, and its ray parameter.
-#[inline]
+#[inline(always)]
 pub(crate) fn exact_hit(
     field: &HeightField,
     pyramid: &crate::MaxPyramid,
@@ -352,5 +377,55 @@ pub fn validate(origins: RayArray<'_>, directions: RayArray<'_>) -> Result<(), H
             Err(HeightFieldError::RayNotFinite { index, what: "direction" })
         }
         Some(index) => Err(HeightFieldError::RayZeroDirection { index }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::search::exact::Exact;
+    use crate::search::relief::Relief;
+
+    fn chunk<'a>(
+        origins: &'a [f64],
+        directions: &'a [f64],
+        t: &'a mut [f32],
+        steps: &'a mut [u32],
+    ) -> Chunk<'a> {
+        Chunk {
+            origins: RayArray::F64(origins),
+            directions: RayArray::F64(directions),
+            from_surface: false,
+            cancel: None,
+            t: Some(t),
+            uv: None,
+            z: None,
+            normal: None,
+            steps: Some(steps),
+            status: None,
+        }
+    }
+
+    /// Runs a search with the processor's best instructions and with the plain ones.
+    fn both_ways<S: Search>(search: &S) {
+        let texels: Vec<f32> = (0..64 * 48).map(|i| ((i * 7919) % 1009) as f32 / 1009.0).collect();
+        let field = HeightField::new(&texels, 64, 48, Wrap::Repeat).unwrap();
+        let n = 3000;
+        let spread = |i: usize, k: usize| ((i * k) % 997) as f64 / 997.0;
+        let origins: Vec<f64> = (0..n).flat_map(|i| [spread(i, 31), spread(i, 57), 1.0]).collect();
+        let directions: Vec<f64> =
+            (0..n).flat_map(|i| [spread(i, 13) - 0.5, 4.0 * spread(i, 7) - 2.0, -0.7]).collect();
+        let mut best = (vec![0.0; n], vec![0; n]);
+        let mut plain = (vec![0.0; n], vec![0; n]);
+        dispatch(search, &field, &mut chunk(&origins, &directions, &mut best.0, &mut best.1));
+        search.march(&field, &mut chunk(&origins, &directions, &mut plain.0, &mut plain.1));
+        assert!(best.0.iter().all(|t| t.is_finite()));
+        assert_eq!(best, plain);
+    }
+
+    #[test]
+    fn better_instructions_change_no_bit() {
+        both_ways(&Relief { linear: 32, refine: 8 });
+        both_ways(&Exact {});
     }
 }

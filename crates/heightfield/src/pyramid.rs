@@ -71,32 +71,32 @@ impl MaxPyramid {
     }
 
     /// All levels, finest first.
-    #[inline]
+    #[inline(always)]
     pub fn levels(&self) -> &[Level] {
         &self.levels
     }
 
     /// The maxima of all levels one after the other, each row by row.
-    #[inline]
+    #[inline(always)]
     pub fn maxima(&self) -> &[f32] {
         &self.maxima
     }
 
     /// The maximum under node `(a, b)` of a level.
-    #[inline]
+    #[inline(always)]
     pub fn at(&self, level: usize, a: usize, b: usize) -> f32 {
         let level = &self.levels[level];
         self.maxima[level.offset + b * level.nodes[0] + a]
     }
 
     /// The highest point of the field.
-    #[inline]
+    #[inline(always)]
     pub fn highest(&self) -> f32 {
         self.maxima[self.maxima.len() - 1]
     }
 
     /// The lowest point of the field.
-    #[inline]
+    #[inline(always)]
     pub fn lowest(&self) -> f32 {
         self.lowest
     }

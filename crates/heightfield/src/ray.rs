@@ -27,13 +27,13 @@ pub struct Found {
 
 impl Found {
     /// A hit at `tau`.
-    #[inline]
+    #[inline(always)]
     pub fn hit(tau: f32, steps: u32) -> Self {
         Self { tau, status: Status::Hit, steps }
     }
 
     /// No hit up to the end of the segment.
-    #[inline]
+    #[inline(always)]
     pub fn left(steps: u32) -> Self {
         Self { tau: 1.0, status: Status::Left, steps }
     }
@@ -63,7 +63,7 @@ impl Segment {
     /// clamped ones): whole periods are taken off the origin. A horizontal ray has no end in the
     /// slab; its segment is one tile long and not [`closed`](Self::closed). Returns `None` where
     /// the ray stays above the lid.
-    #[inline]
+    #[inline(always)]
     pub fn clip(origin: [f64; 3], direction: [f64; 3], cos_theta: f32, period: f64) -> Option<Self> {
         let [ou, ov, oz] = origin;
         let [du, dv, dz] = direction;

@@ -19,7 +19,7 @@ technique! {
 }
 
 impl Search for Binary {
-    #[inline]
+    #[inline(always)]
     fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
         let mut above = 0.0;
         let mut below = 1.0;
@@ -36,7 +36,7 @@ impl Search for Binary {
         if found { Found::hit(below, self.steps) } else { Found::left(self.steps) }
     }
 
-    #[inline]
+    #[inline(always)]
     fn occluded(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> bool {
         // Halving towards the surface; closer than 1/256 the surface shadows itself by rounding.
         let mut far = 1.0;

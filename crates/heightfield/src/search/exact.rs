@@ -78,6 +78,7 @@ struct Axis<T> {
 }
 
 impl<T: Float + FromPrimitive> Axis<T> {
+    #[inline(always)]
     fn new(position: T, direction: T, cells: usize, periodic: bool) -> Self {
         let n = int::<T>(cells as i64);
         let floor = position.floor();
@@ -97,13 +98,13 @@ impl<T: Float + FromPrimitive> Axis<T> {
     }
 
     /// When the ray reaches a plane between cells. Grows with the distance of the plane.
-    #[inline]
+    #[inline(always)]
     fn time_of(&self, plane: i64) -> T {
         (int::<T>(plane) - self.start) * self.inverse
     }
 
     /// When the ray leaves the node.
-    #[inline]
+    #[inline(always)]
     fn exit(&self, level: usize) -> T {
         if self.inverse == T::zero() {
             return T::infinity();
@@ -124,7 +125,7 @@ impl<T: Float + FromPrimitive> Axis<T> {
     }
 
     /// Steps into the next node; says whether that crossed a border of the parent.
-    #[inline]
+    #[inline(always)]
     fn advance(&mut self, nodes: usize) -> bool {
         if self.inverse > T::zero() {
             self.node += 1;
@@ -145,7 +146,7 @@ impl<T: Float + FromPrimitive> Axis<T> {
     }
 
     /// Goes down to the child that the ray is in at time `t`.
-    #[inline]
+    #[inline(always)]
     fn descend(&mut self, level: usize, t: T) {
         let child = 2 * self.node;
         let middle = (child + 1) << (level - 1);
@@ -166,14 +167,14 @@ impl<T: Float + FromPrimitive> Axis<T> {
     }
 
     /// Position inside cell `node` (level 0) at time `t`.
-    #[inline]
+    #[inline(always)]
     fn local(&self, t: T, direction: T) -> T {
         let x = self.start - int::<T>(self.node as i64 + self.tile) + t * direction;
         if x.is_finite() { x.max(T::zero()).min(T::one()) } else { T::zero() }
     }
 }
 
-#[inline]
+#[inline(always)]
 fn int<T: FromPrimitive + Float>(i: i64) -> T {
     T::from_i64(i).unwrap_or_else(T::zero)
 }
@@ -182,7 +183,7 @@ fn int<T: FromPrimitive + Float>(i: i64) -> T {
 ///
 /// `gap` is ray height minus surface height at the entry, `z_gap(s) = gap + s * (slope + s * bend)`.
 /// Returns the first `s` in `0..=length` where it reaches zero.
-#[inline]
+#[inline(always)]
 fn first_root<T: Float>(gap: T, slope: T, bend: T, length: T, from_surface: bool) -> Option<T> {
     let zero = T::zero();
     if from_surface {
@@ -222,6 +223,7 @@ fn first_root<T: Float>(gap: T, slope: T, bend: T, length: T, from_surface: bool
 }
 
 /// Follows a ray through the pyramid to the first point on or below the surface.
+#[inline(always)]
 pub fn trace<T: Float + FromPrimitive>(
     field: &HeightField,
     pyramid: &MaxPyramid,
@@ -315,24 +317,25 @@ pub fn trace<T: Float + FromPrimitive>(
 }
 
 /// A direction that matters only where the surface changes along it; keeps endless cells finite.
-#[inline]
+#[inline(always)]
 fn moving<T: Float>(direction: T, along: T, twist: T) -> T {
     if along == T::zero() && twist == T::zero() { T::zero() } else { direction }
 }
 
-#[inline]
+#[inline(always)]
 fn zero_of<T: Float>() -> T {
     T::zero()
 }
 
 /// Turns a texture-space position into cell space.
-#[inline]
+#[inline(always)]
 pub fn cell_position(field: &HeightField, u: f64, v: f64) -> [f64; 2] {
     let first = field.first_texel() as f64;
     [u * field.width() as f64 - 0.5 - first, v * field.height() as f64 - 0.5 - first]
 }
 
 impl Exact {
+    #[inline(always)]
     fn trace_f32(field: &HeightField, start: Vec3, delta: Vec3, from_surface: bool) -> CellHit<f32> {
         let first = field.first_texel() as f32;
         let (w, h) = (field.width() as f32, field.height() as f32);
@@ -346,15 +349,18 @@ impl Exact {
 }
 
 impl Search for Exact {
+    #[inline(always)]
     fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
         let hit = Self::trace_f32(field, start, delta, false);
         Found { tau: hit.t, status: hit.status, steps: hit.steps }
     }
 
+    #[inline(always)]
     fn occluded(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> bool {
         Self::trace_f32(field, start, delta, true).status == Status::Hit
     }
 
+    #[inline(always)]
     fn march(&self, field: &HeightField, chunk: &mut Chunk<'_>) {
         march_exact(field, chunk);
     }

@@ -19,7 +19,7 @@ technique! {
 }
 
 impl Search for Interval {
-    #[inline]
+    #[inline(always)]
     fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
         let bracket = first_below(field, start, delta, self.linear);
         if !bracket.found {
@@ -40,7 +40,7 @@ impl Search for Interval {
         Found::hit(secant(above, below, gap_above, gap_below), bracket.steps + self.refine)
     }
 
-    #[inline]
+    #[inline(always)]
     fn occluded(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> bool {
         any_below(field, start, delta, self.linear)
     }

@@ -23,7 +23,7 @@ pub struct Bracket {
 }
 
 /// Ray height minus surface height at `tau`.
-#[inline]
+#[inline(always)]
 pub fn gap_at(field: &HeightField, start: Vec3, delta: Vec3, tau: f32) -> f32 {
     let p = start + delta * tau;
     p.z - field.sample(p.x, p.y)
@@ -32,7 +32,7 @@ pub fn gap_at(field: &HeightField, start: Vec3, delta: Vec3, tau: f32) -> f32 {
 /// Samples the segment at the end of each of `layers` equal layers until one lies on or below the
 /// surface. The start is not sampled: on the lid nothing is above it. The end of a segment that goes
 /// down is the floor, which counts as below whatever the rounding.
-#[inline]
+#[inline(always)]
 pub fn first_below(field: &HeightField, start: Vec3, delta: Vec3, layers: u32) -> Bracket {
     let mut above = 0.0;
     let mut gap_above = 0.0;
@@ -55,7 +55,7 @@ pub fn first_below(field: &HeightField, start: Vec3, delta: Vec3, layers: u32) -
 ///
 /// A start below the surface is lifted onto it: searches that stop at a layer return hits up to a layer
 /// too deep, and from there a surface would shadow itself.
-#[inline]
+#[inline(always)]
 pub fn any_below(field: &HeightField, start: Vec3, delta: Vec3, layers: u32) -> bool {
     let lift = Vec3::Z * (field.sample(start.x, start.y) - start.z).max(0.0);
     let (start, delta) = (start + lift, delta - lift);
@@ -63,21 +63,21 @@ pub fn any_below(field: &HeightField, start: Vec3, delta: Vec3, layers: u32) -> 
 }
 
 /// Where the chord between the two samples of a bracket reaches zero.
-#[inline]
+#[inline(always)]
 pub fn secant(above: f32, below: f32, gap_above: f32, gap_below: f32) -> f32 {
     let drop = gap_above - gap_below;
     if drop > 0.0 { above + (below - above) * (gap_above / drop) } else { below }
 }
 
 /// Layers for a view at `cos_theta`: `most` at grazing angles, `least` head-on, changing linearly.
-#[inline]
+#[inline(always)]
 pub fn linear_layers(least: u32, most: u32, cos_theta: f32) -> u32 {
     let (least, most) = (least as f32, most as f32);
     (most + (least - most) * cos_theta.clamp(0.0, 1.0)).ceil().max(1.0) as u32
 }
 
 /// The same, changing by equal factors: `most * (least / most)^cos_theta`.
-#[inline]
+#[inline(always)]
 pub fn exponential_layers(least: u32, most: u32, cos_theta: f32) -> u32 {
     let (least, most) = (least as f32, most as f32);
     (most * (least / most).powf(cos_theta.clamp(0.0, 1.0))).ceil().max(1.0) as u32

@@ -18,7 +18,7 @@ pub trait Search: Sized {
     fn occluded(&self, field: &HeightField, start: Vec3, delta: Vec3, cos_theta: f32) -> bool;
 
     /// Runs the search over many rays.
-    #[inline]
+    #[inline(always)]
     fn march(&self, field: &HeightField, chunk: &mut Chunk<'_>) {
         march_by_segments(self, field, chunk);
     }
@@ -57,11 +57,11 @@ macro_rules! technique {
             occluded: |field, start, delta, cos_theta, values| {
                 $type::read(values).occluded(field, start, delta, cos_theta)
             },
-            march: |field, values, chunk| $type::read(values).march(field, chunk),
+            march: |field, values, chunk| $crate::march::dispatch(&$type::read(values), field, chunk),
         };
 
         impl $type {
-            #[inline]
+            #[inline(always)]
             fn read(values: &$crate::technique::Values) -> Self {
                 let [$($parameter,)* ..] = *values;
                 Self { $($parameter: $parameter as u32,)* }

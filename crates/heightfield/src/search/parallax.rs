@@ -17,7 +17,7 @@ technique! {
 }
 
 impl Search for Parallax {
-    #[inline]
+    #[inline(always)]
     fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
         let dz = delta.z;
         if dz >= 0.0 {
@@ -29,7 +29,7 @@ impl Search for Parallax {
         Found::hit(((height - start.z) / dz).max(0.0), 1)
     }
 
-    #[inline]
+    #[inline(always)]
     fn occluded(&self, _field: &HeightField, _start: Vec3, _delta: Vec3, _cos_theta: f32) -> bool {
         false
     }

@@ -18,7 +18,7 @@ technique! {
 }
 
 impl Search for ParallaxLimited {
-    #[inline]
+    #[inline(always)]
     fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, cos_theta: f32) -> Found {
         let dz = delta.z;
         if dz >= 0.0 {
@@ -31,7 +31,7 @@ impl Search for ParallaxLimited {
         Found::hit(((level - start.z) / dz).max(0.0), 1)
     }
 
-    #[inline]
+    #[inline(always)]
     fn occluded(&self, _field: &HeightField, _start: Vec3, _delta: Vec3, _cos_theta: f32) -> bool {
         false
     }

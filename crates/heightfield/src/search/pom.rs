@@ -17,7 +17,7 @@ technique! {
 }
 
 impl Search for Pom {
-    #[inline]
+    #[inline(always)]
     fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
         let bracket = first_below(field, start, delta, self.steps);
         if !bracket.found {
@@ -27,7 +27,7 @@ impl Search for Pom {
         Found::hit(tau, bracket.steps)
     }
 
-    #[inline]
+    #[inline(always)]
     fn occluded(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> bool {
         any_below(field, start, delta, self.steps)
     }

@@ -19,7 +19,7 @@ technique! {
 }
 
 impl Search for Relief {
-    #[inline]
+    #[inline(always)]
     fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
         let bracket = first_below(field, start, delta, self.linear);
         if !bracket.found {
@@ -38,7 +38,7 @@ impl Search for Relief {
         Found::hit(0.5 * (above + below), bracket.steps + self.refine)
     }
 
-    #[inline]
+    #[inline(always)]
     fn occluded(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> bool {
         any_below(field, start, delta, self.linear)
     }

@@ -18,13 +18,13 @@ technique! {
 }
 
 impl Search for Steep {
-    #[inline]
+    #[inline(always)]
     fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
         let bracket = first_below(field, start, delta, self.steps);
         if bracket.found { Found::hit(bracket.below, bracket.steps) } else { Found::left(bracket.steps) }
     }
 
-    #[inline]
+    #[inline(always)]
     fn occluded(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> bool {
         any_below(field, start, delta, self.steps)
     }

@@ -19,14 +19,14 @@ technique! {
 }
 
 impl Search for SteepExponential {
-    #[inline]
+    #[inline(always)]
     fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, cos_theta: f32) -> Found {
         let bracket =
             first_below(field, start, delta, exponential_layers(self.min_steps, self.max_steps, cos_theta));
         if bracket.found { Found::hit(bracket.below, bracket.steps) } else { Found::left(bracket.steps) }
     }
 
-    #[inline]
+    #[inline(always)]
     fn occluded(&self, field: &HeightField, start: Vec3, delta: Vec3, cos_theta: f32) -> bool {
         any_below(field, start, delta, exponential_layers(self.min_steps, self.max_steps, cos_theta))
     }
