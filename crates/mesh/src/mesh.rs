@@ -7,7 +7,7 @@ use glam::{Vec2, Vec3, Vec4};
 
 use crate::arrays::{Arrays, checked};
 use crate::error::MeshError;
-use crate::frame::{FrameMethod, Split, derivatives, tangents};
+use crate::frame::{FrameMethod, Split, Surface, derivatives, tangents};
 use crate::material::MaterialSource;
 
 /// A run of triangles with one name and one material.
@@ -59,8 +59,9 @@ impl Mesh {
     /// primitive in its own space. Missing normals are flat, as glTF asks.
     ///
     /// OBJ: objects, groups and materials become parts. Missing normals are smoothed over edges
-    /// that bend by less than 60 degrees and stay hard elsewhere. Missing material libraries and
-    /// textures are warnings.
+    /// that bend by less than 60 degrees and stay hard elsewhere. MikkTSpace is run on the file's
+    /// triangles and quads, as in Blender, and on the triangles of larger polygons and of quads
+    /// whose triangles are given different normals where they meet. Missing material libraries and textures are warnings.
     ///
     /// # Errors
     /// [`MeshError::NotFound`], [`MeshError::Read`], [`MeshError::UnknownFormat`],
@@ -120,14 +121,15 @@ impl Mesh {
             tangents: tangents.map(|t| t.iter().map(|&t| Vec4::from(t)).collect()),
             indices: indices.to_vec(),
         };
-        let mut mesh = Self::assemble(checked(arrays)?)?;
+        let mut mesh = Self::assemble(checked(arrays)?, &[])?;
         mesh.parts =
             vec![Part { name: String::new(), triangles: 0..mesh.indices.len() as u32, material: None }];
         Ok(mesh)
     }
 
     /// Finishes checked arrays: normals, tangents (splitting vertices) and derivatives. No parts.
-    pub(crate) fn assemble(arrays: Arrays) -> Result<Self, MeshError> {
+    /// `quads` names, in order, each triangle that makes a quad with the next one.
+    pub(crate) fn assemble(arrays: Arrays, quads: &[u32]) -> Result<Self, MeshError> {
         let mut warnings = Vec::new();
         let mut mesh = Self {
             normals: crate::normals::complete(&arrays, &mut warnings),
@@ -141,7 +143,7 @@ impl Mesh {
                 mesh.tangents = crate::frame::convention::repair(&given, &mesh.normals, &mut warnings);
             }
             None => {
-                let split = mesh.tangents(FrameMethod::MikkTSpace)?;
+                let split = mesh.surface(quads).tangents(FrameMethod::MikkTSpace)?;
                 mesh.apply(split, &mut warnings);
             }
         }
@@ -152,10 +154,18 @@ impl Mesh {
 
     /// Tangents of this mesh by another method; the mesh itself stays as it is.
     ///
+    /// They come from the triangles: where an OBJ has quads, MikkTSpace run here may differ by some
+    /// degrees from the tangents the mesh was read with.
+    ///
     /// # Errors
     /// [`MeshError::TooLarge`] when splitting would make too many vertices.
     pub fn tangents(&self, method: FrameMethod) -> Result<Split, MeshError> {
         tangents(method, &self.positions, &self.normals, &self.uvs, &self.indices)
+    }
+
+    fn surface<'a>(&'a self, quads: &'a [u32]) -> Surface<'a> {
+        let Self { positions, normals, uvs, indices, .. } = self;
+        Surface { positions, normals, uvs, indices, quads }
     }
 
     /// This mesh with its vertices split and its frames replaced by another method's.

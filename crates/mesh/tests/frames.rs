@@ -4,9 +4,9 @@
 
 mod common;
 
-use std::collections::HashMap;
 use std::time::{Duration, Instant};
 
+use common::plain::plain_mikktspace;
 use common::{assert_sound, degrees};
 use glam::{DMat2, DVec2, DVec3, Vec2, Vec3, Vec4};
 use mesh::frame::{convention, face_frame};
@@ -215,76 +215,10 @@ fn stacked_triangles_do_not_hang() {
     assert!(mesh.tangents.iter().all(|t| t.x > 0.999 && t.w == 1.0));
 }
 
-/// MikkTSpace as its paper defines it, in f64 and written for clarity: corners at the same position,
-/// normal and UV, reached from each other over shared edges between faces of equal orientation,
-/// share the angle-weighted sum of the faces' tangents projected into the plane of the normal.
-fn plain_mikktspace(mesh: &Mesh) -> Vec<Option<(DVec3, f32)>> {
-    let mut ids = HashMap::new();
-    let weld: Vec<usize> = (0..mesh.positions.len())
-        .map(|i| {
-            let (p, n, t) = (mesh.positions[i] + 0.0, mesh.normals[i] + 0.0, mesh.uvs[i] + 0.0);
-            let key = [p.x, p.y, p.z, n.x, n.y, n.z, t.x, t.y].map(f32::to_bits);
-            let next = ids.len();
-            *ids.entry(key).or_insert(next)
-        })
-        .collect();
-    let corner_ids: Vec<[usize; 3]> = mesh.indices.iter().map(|t| t.map(|i| weld[i as usize])).collect();
-    let position =
-        |face: usize, corner: usize| mesh.positions[mesh.indices[face][corner % 3] as usize].as_dvec3();
-    let uv = |face: usize, corner: usize| mesh.uvs[mesh.indices[face][corner % 3] as usize].as_dvec2();
-    let area = |face| (uv(face, 1) - uv(face, 0)).perp_dot(uv(face, 2) - uv(face, 0));
-
-    let mut parent: Vec<usize> = (0..mesh.indices.len() * 3).collect();
-    fn root(parent: &[usize], mut i: usize) -> usize {
-        while parent[i] != i {
-            i = parent[i];
-        }
-        i
-    }
-    let mut edges: HashMap<(usize, usize), (usize, usize)> = HashMap::new();
-    for (face, ids) in corner_ids.iter().enumerate() {
-        for c in 0..3 {
-            edges.insert((ids[c], ids[(c + 1) % 3]), (face, c));
-        }
-    }
-    for (&(a, b), &(face, c)) in &edges {
-        let Some(&(other, d)) = edges.get(&(b, a)) else { continue };
-        if (area(face) > 0.0) == (area(other) > 0.0) {
-            for (mine, theirs) in [(c, (d + 1) % 3), ((c + 1) % 3, d)] {
-                let (x, y) = (root(&parent, face * 3 + mine), root(&parent, other * 3 + theirs));
-                parent[x] = y;
-            }
-        }
-    }
-    let mut sums = vec![DVec3::ZERO; parent.len()];
-    for face in 0..mesh.indices.len() {
-        let Some(frame) = face_frame([0, 1, 2].map(|c| position(face, c)), [0, 1, 2].map(|c| uv(face, c)))
-        else {
-            continue;
-        };
-        for c in 0..3 {
-            let normal = mesh.normals[mesh.indices[face][c] as usize].as_dvec3();
-            let flat = |v: DVec3| (v - normal * normal.dot(v)).normalize_or_zero();
-            let (e, f) = (
-                flat(position(face, c + 1) - position(face, c)),
-                flat(position(face, c + 2) - position(face, c)),
-            );
-            sums[root(&parent, face * 3 + c)] += flat(frame.dpdu) * e.dot(f).clamp(-1.0, 1.0).acos();
-        }
-    }
-    (0..parent.len())
-        .map(|corner| {
-            let sum = sums[root(&parent, corner)];
-            // v is down, so a positive UV area is a mirrored image.
-            let w = if area(corner / 3) < 0.0 { 1.0 } else { -1.0 };
-            (sum.length() > 1e-3).then(|| (sum.normalize(), w))
-        })
-        .collect()
-}
-
 fn compare_with_plain(mesh: &Mesh, what: &str) {
     let split = mesh.tangents(FrameMethod::MikkTSpace).unwrap();
-    let plain = plain_mikktspace(mesh);
+    let triangles: Vec<Vec<u32>> = mesh.indices.iter().map(|t| t.to_vec()).collect();
+    let plain = plain_mikktspace(mesh, &triangles).concat();
     let mut compared = 0;
     for (corner, expected) in plain.iter().enumerate() {
         let Some((direction, w)) = expected else { continue };

@@ -40,7 +40,7 @@ pub fn derivatives(
     tangents: &[Vec4],
     indices: &[[u32; 3]],
 ) -> Derivatives {
-    let surface = Surface { positions, normals, uvs, indices };
+    let surface = Surface { positions, normals, uvs, indices, quads: &[] };
     let mut sums = vec![[Sum::default(); 2]; positions.len()];
     for (face, triangle) in indices.iter().enumerate() {
         let plane = face_normal(positions, triangle);

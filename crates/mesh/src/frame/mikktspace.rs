@@ -1,9 +1,9 @@
-//! MikkTSpace on unindexed corners, kept linear in time and safe from deep recursion.
+//! MikkTSpace on unindexed corners of triangles and quads, linear in time and safe from deep recursion.
 //!
 //! Source: M. S. Mikkelsen, "Simulation of Wrinkled Surfaces Revisited", 2008, and his MikkTSpace.
 //! The algorithm compares every pair of faces around a vertex, recurses around it, and searches all
 //! faces for each degenerate one. Harmless on usual meshes, endless on a fan of a million triangles:
-//! so degenerate triangles are set aside and given their neighbours' tangents here, large fans get a
+//! so degenerate faces are set aside and given their neighbours' tangents here, large fans get a
 //! larger stack, and absurd ones fall back to per-face frames with a warning.
 
 use std::collections::HashMap;
@@ -26,37 +26,90 @@ const STACK_PER_FACE: u64 = 1024;
 
 const NONE: u32 = u32::MAX;
 
+/// Corners of a quad among those of its halves, `abc` and `acd`: the diagonal's stand in both.
+const QUAD: [[usize; 2]; 4] = [[0, 3], [1, 1], [2, 4], [5, 5]];
+
+/// A triangle, or the quad it makes with the next one.
+#[derive(Clone, Copy)]
+struct Face {
+    triangle: usize,
+    quad: bool,
+}
+
+impl Face {
+    fn triangles(self) -> usize {
+        1 + usize::from(self.quad)
+    }
+
+    fn corners(self) -> usize {
+        2 + self.triangles()
+    }
+
+    /// Where a corner stands among the corners of all triangles, once or twice.
+    fn places(self, corner: usize) -> [usize; 2] {
+        let within = if self.quad { QUAD[corner] } else { [corner; 2] };
+        within.map(|place| self.triangle * 3 + place)
+    }
+
+    fn vertex(self, surface: Surface<'_>, corner: usize) -> usize {
+        let [place, _] = self.places(corner);
+        surface.indices[place / 3][place % 3] as usize
+    }
+}
+
 /// A tangent for each corner of each triangle; `None` where UVs give none.
 pub(super) fn corners(surface: Surface<'_>, warnings: &mut Vec<String>) -> Vec<Option<Vec4>> {
     let welded = weld(surface);
-    let good: Vec<u32> = (0..surface.indices.len() as u32)
-        .filter(|&face| {
-            let [a, b, c] = surface.indices[face as usize].map(|i| surface.positions[i as usize]);
-            a != b && b != c && c != a
-        })
-        .collect();
-    let mut faces_at = vec![0u32; surface.positions.len()];
-    for &face in &good {
-        for vertex in surface.indices[face as usize] {
-            faces_at[welded[vertex as usize] as usize] += 1;
-        }
-    }
-    let most = u64::from(faces_at.iter().copied().max().unwrap_or(0));
-    let pairs = pairs_at_positions(surface, &good);
-    if pairs > PAIRS + PAIRS_PER_TRIANGLE * good.len() as u64 {
+    let faces = sound_faces(surface);
+    let most = triangles_at(surface, &faces, &welded).into_iter().max().unwrap_or(0);
+    // Bounds every step that compares pairs: welding looks at all corners of a position, grouping at
+    // the faces of a welded vertex.
+    let pairs: u64 = triangles_at(surface, &faces, &places(surface)).into_iter().map(|k| k * k).sum();
+    let triangles: usize = faces.iter().map(|face| face.triangles()).sum();
+    if pairs > PAIRS + PAIRS_PER_TRIANGLE * triangles as u64 {
         let why = "too many triangles meet at one position for MikkTSpace; per-face tangents used";
         warnings.push(why.to_owned());
         return dietrich::corners(surface);
     }
 
-    let mut job = Job { surface, good: &good, out: vec![None; surface.indices.len() * 3] };
+    let mut job = Job { surface, faces: &faces, out: vec![None; surface.indices.len() * 3] };
     if !job.run(most) {
         warnings.push("MikkTSpace could not start its thread; per-face tangents used".to_owned());
         return dietrich::corners(surface);
     }
     let mut out = job.out;
-    inherit(surface, &welded, &good, &mut out);
+    inherit(surface, &welded, &faces, &mut out);
     out
+}
+
+/// The quads and triangles that the generator need not search the others for.
+fn sound_faces(surface: Surface<'_>) -> Vec<Face> {
+    let position = |i: u32| surface.positions[i as usize];
+    let is_triangle = |triangle: usize| {
+        let [a, b, c] = surface.indices[triangle].map(position);
+        a != b && b != c && c != a
+    };
+    // Whichever diagonal the generator takes, at least one half has no equal corners. Halves with
+    // different normals along the diagonal do not share both vertices.
+    let is_quad = |triangle: usize| {
+        let [i, j, k] = surface.indices[triangle];
+        let Some(&[_, _, l]) = surface.indices.get(triangle + 1).filter(|next| next[..2] == [i, k]) else {
+            return false;
+        };
+        let [a, b, c, d] = [i, j, k, l].map(position);
+        a != c && b != d && (a != b || c != d) && (b != c || d != a)
+    };
+    let mut faces = Vec::with_capacity(surface.indices.len());
+    let mut triangle = 0;
+    while triangle < surface.indices.len() {
+        let quad = surface.quads.binary_search(&(triangle as u32)).is_ok() && is_quad(triangle);
+        let face = Face { triangle, quad };
+        if quad || is_triangle(triangle) {
+            faces.push(face);
+        }
+        triangle += face.triangles();
+    }
+    faces
 }
 
 /// For each vertex, the first one with the same position, normal and UV.
@@ -75,56 +128,52 @@ fn weld(surface: Surface<'_>) -> Vec<u32> {
         .collect()
 }
 
-/// Pairs of faces that meet at a position. Bounds every step that compares pairs: welding looks at
-/// all corners of a position, grouping at the faces of a welded vertex.
-fn pairs_at_positions(surface: Surface<'_>, good: &[u32]) -> u64 {
+/// For each vertex, a number for its position.
+fn places(surface: Surface<'_>) -> Vec<u32> {
     let mut ids: HashMap<[u32; 3], u32> = HashMap::with_capacity(surface.positions.len());
-    let place: Vec<u32> = surface
-        .positions
-        .iter()
-        .map(|p| {
-            let next = ids.len() as u32;
-            *ids.entry((*p + 0.0).to_array().map(f32::to_bits)).or_insert(next)
-        })
-        .collect();
-    let mut faces_at = vec![0u32; ids.len()];
-    for &face in good {
-        for vertex in surface.indices[face as usize] {
-            faces_at[place[vertex as usize] as usize] += 1;
+    let number = |p: &Vec3| {
+        let next = ids.len() as u32;
+        *ids.entry((*p + 0.0).to_array().map(f32::to_bits)).or_insert(next)
+    };
+    surface.positions.iter().map(number).collect()
+}
+
+/// How many triangles can meet at each number: the diagonal of a quad may end at any corner.
+fn triangles_at(surface: Surface<'_>, faces: &[Face], numbers: &[u32]) -> Vec<u64> {
+    let mut count = vec![0; numbers.len()];
+    for face in faces {
+        for corner in 0..face.corners() {
+            count[numbers[face.vertex(surface, corner)] as usize] += face.triangles() as u64;
         }
     }
-    faces_at.iter().map(|&k| u64::from(k) * u64::from(k)).sum()
+    count
 }
 
 /// Gives corners of degenerate triangles the tangent of the first sound corner at the same vertex.
-fn inherit(surface: Surface<'_>, welded: &[u32], good: &[u32], out: &mut [Option<Vec4>]) {
-    if good.len() == surface.indices.len() {
-        return;
-    }
+fn inherit(surface: Surface<'_>, welded: &[u32], faces: &[Face], out: &mut [Option<Vec4>]) {
     let mut source = vec![NONE; welded.len()];
-    let mut sound = vec![false; surface.indices.len()];
-    for &face in good {
-        sound[face as usize] = true;
-        for (corner, vertex) in surface.indices[face as usize].iter().enumerate() {
-            let slot = &mut source[welded[*vertex as usize] as usize];
+    let mut sound = vec![false; out.len()];
+    for face in faces {
+        for corner in 0..face.corners() {
+            let places = face.places(corner);
+            places.into_iter().for_each(|place| sound[place] = true);
+            let slot = &mut source[welded[face.vertex(surface, corner)] as usize];
             if *slot == NONE {
-                *slot = face * 3 + corner as u32;
+                *slot = places[0] as u32;
             }
         }
     }
-    for (face, triangle) in surface.indices.iter().enumerate().filter(|(face, _)| !sound[*face]) {
-        for (corner, &vertex) in triangle.iter().enumerate() {
-            let from = source[welded[vertex as usize] as usize];
-            if from != NONE {
-                out[face * 3 + corner] = out[from as usize];
-            }
+    for (place, &vertex) in surface.indices.iter().flatten().enumerate().filter(|(place, _)| !sound[*place]) {
+        let from = source[welded[vertex as usize] as usize];
+        if from != NONE {
+            out[place] = out[from as usize];
         }
     }
 }
 
 struct Job<'a> {
     surface: Surface<'a>,
-    good: &'a [u32],
+    faces: &'a [Face],
     out: Vec<Option<Vec4>>,
 }
 
@@ -146,17 +195,17 @@ impl Job<'_> {
     }
 
     fn vertex(&self, face: usize, corner: usize) -> usize {
-        self.surface.indices[self.good[face] as usize][corner] as usize
+        self.faces[face].vertex(self.surface, corner)
     }
 }
 
 impl Geometry for Job<'_> {
     fn num_faces(&self) -> usize {
-        self.good.len()
+        self.faces.len()
     }
 
-    fn num_vertices_of_face(&self, _face: usize) -> usize {
-        3
+    fn num_vertices_of_face(&self, face: usize) -> usize {
+        self.faces[face].corners()
     }
 
     fn position(&self, face: usize, corner: usize) -> [f32; 3] {
@@ -172,10 +221,12 @@ impl Geometry for Job<'_> {
     }
 
     fn set_tangent(&mut self, found: Option<TangentSpace>, face: usize, corner: usize) {
-        let slot = &mut self.out[self.good[face] as usize * 3 + corner];
-        *slot = found.map(|space| Vec4::from(space.tangent_encoded())).filter(|tangent| {
+        let tangent = found.map(|space| Vec4::from(space.tangent_encoded())).filter(|tangent| {
             // Huge or collapsed triangles leave a tangent of no length, or none at all.
             tangent.is_finite() && (Vec3::length_squared(tangent.truncate()) - 1.0).abs() < 1e-3
         });
+        for place in self.faces[face].places(corner) {
+            self.out[place] = tangent;
+        }
     }
 }

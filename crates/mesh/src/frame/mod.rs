@@ -21,7 +21,8 @@ pub use join::Split;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum FrameMethod {
-    /// The standard of glTF, Blender and Unreal (Mikkelsen 2008), run on unindexed corners.
+    /// The standard of glTF, Blender and Unreal (Mikkelsen 2008), run on unindexed corners. On
+    /// triangles; only while an OBJ is read does it see the file's quads.
     MikkTSpace,
     /// One frame per triangle from the plane through `(x, u, v)`, and so for y and z; `dP/du` made
     /// perpendicular to the vertex normal (Dietrich, Game Programming Gems, 2000). Nothing is
@@ -61,6 +62,21 @@ pub(crate) struct Surface<'a> {
     pub normals: &'a [Vec3],
     pub uvs: &'a [Vec2],
     pub indices: &'a [[u32; 3]],
+    /// Ascending: triangles `abc` that the next one, `acd`, makes a quad.
+    pub quads: &'a [u32],
+}
+
+impl Surface<'_> {
+    /// A tangent for each vertex, splitting where those of its corners differ.
+    pub(crate) fn tangents(self, method: FrameMethod) -> Result<Split, MeshError> {
+        let mut warnings = Vec::new();
+        let corners = match method {
+            FrameMethod::MikkTSpace => mikktspace::corners(self, &mut warnings),
+            FrameMethod::Dietrich => dietrich::corners(self),
+        };
+        let corners = degenerate::fill(self, corners, &mut warnings);
+        join::join(self.positions.len(), self.normals, self.indices, &corners, warnings)
+    }
 }
 
 /// Tangents for plain arrays: one position, unit normal and UV (`v` down) a vertex.
@@ -92,12 +108,5 @@ pub fn tangents(
     if let Some(vertex) = (0..vertices).find(|&i| !finite(i)) {
         return Err(MeshError::arrays(format!("vertex {vertex} is NaN or infinite")));
     }
-    let surface = Surface { positions, normals, uvs, indices };
-    let mut warnings = Vec::new();
-    let corners = match method {
-        FrameMethod::MikkTSpace => mikktspace::corners(surface, &mut warnings),
-        FrameMethod::Dietrich => dietrich::corners(surface),
-    };
-    let corners = degenerate::fill(surface, corners, &mut warnings);
-    join::join(vertices, normals, indices, &corners, warnings)
+    Surface { positions, normals, uvs, indices, quads: &[] }.tangents(method)
 }

@@ -93,7 +93,7 @@ pub(super) fn read(
     if arrays.normals.is_none() {
         arrays = flat(&arrays);
     }
-    let mut mesh = Mesh::assemble(checked(arrays).map_err(in_place)?)?;
+    let mut mesh = Mesh::assemble(checked(arrays).map_err(in_place)?, &[])?;
     warnings.extend(mesh.warnings.drain(..).map(|w| format!("{place}: {w}")));
     Ok(Some(mesh))
 }

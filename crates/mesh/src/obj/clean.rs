@@ -18,6 +18,8 @@ pub(super) struct Cleaned {
     pub text: String,
     /// What the `mtllib` lines say, in order.
     pub libraries: Vec<String>,
+    /// First of the two triangles of each quad: `abc` of `abc` and `acd`.
+    pub quads: Vec<u32>,
 }
 
 struct Cleaner<'a> {
@@ -66,11 +68,11 @@ pub(super) fn clean(text: &str, name: &str, warnings: &mut Vec<String>) -> Resul
     cleaner.data.push_str("mtllib all\nvt 0 0\nvn 0 0 0\n");
     for_each_line(text, |number, line| cleaner.line(number, line))?;
     cleaner.check_highest()?;
-    cleaner.write();
+    let quads = cleaner.write();
     cleaner.warn(warnings);
     let mut text = cleaner.data;
     text.push_str(&cleaner.faces);
-    Ok(Cleaned { text, libraries: cleaner.libraries })
+    Ok(Cleaned { text, libraries: cleaner.libraries, quads })
 }
 
 impl Cleaner<'_> {
@@ -211,8 +213,10 @@ impl Cleaner<'_> {
         Ok(())
     }
 
-    /// Writes groups and faces, once every index is known to be good.
-    fn write(&mut self) {
+    /// Writes groups and faces, once every index is known to be good. Returns where the quads are.
+    fn write(&mut self) -> Vec<u32> {
+        let mut quads = Vec::new();
+        let mut written = 0;
         let mut rest = self.corners.as_slice();
         let mut tests = EAR_TESTS;
         for item in &self.items {
@@ -226,6 +230,10 @@ impl Cleaner<'_> {
             let (corners, after) = rest.split_at(count);
             rest = after;
             self.without_uv += usize::from(corners.iter().any(|c| c[1] == 0));
+            if count == 4 {
+                quads.push(written);
+            }
+            written += count as u32 - 2;
             let corner = |i: usize| corners[i];
             if count == 3 {
                 write_triangle(&mut self.faces, [0, 1, 2].map(corner));
@@ -236,6 +244,7 @@ impl Cleaner<'_> {
                 write_triangle(&mut self.faces, triangle.map(corner));
             }
         }
+        quads
     }
 
     fn warn(&self, warnings: &mut Vec<String>) {

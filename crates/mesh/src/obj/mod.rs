@@ -55,7 +55,7 @@ pub(crate) fn read(bytes: &[u8], folder: &Path, name: &str) -> Result<Mesh, Mesh
         other => other,
     };
     let arrays = complete_normals(checked(arrays).map_err(in_file)?, &mut warnings);
-    let mut mesh = Mesh::assemble(checked(arrays).map_err(in_file)?)?;
+    let mut mesh = Mesh::assemble(checked(arrays).map_err(in_file)?, &cleaned.quads)?;
     mesh.parts = parts;
     mesh.materials = library.sources;
     warnings.append(&mut mesh.warnings);

@@ -7,7 +7,8 @@ use glam::{DVec2, DVec3};
 pub(super) const EAR_TESTS: u64 = 1_000_000_000;
 
 /// Triangles over the corners of a polygon: a fan from the first corner when it is convex, as other
-/// readers do, else by clipping ears (Meisters 1975) while `tests` last.
+/// readers do, else by clipping ears (Meisters 1975) while `tests` last. Those of a quad `abcd` are
+/// `abc` and `acd`, counting from one corner or another.
 pub(super) fn triangulate(outline: &[DVec3], tests: &mut u64) -> Vec<[usize; 3]> {
     let fan = || (2..outline.len()).map(|i| [0, i - 1, i]).collect();
     if outline.len() <= 3 {
@@ -29,6 +30,10 @@ pub(super) fn triangulate(outline: &[DVec3], tests: &mut u64) -> Vec<[usize; 3]>
         let n = left.len();
         triangles.push([left[(at + n - 1) % n], left[at], left[(at + 1) % n]]);
         left.remove(at);
+        if n == 4 {
+            // The rest starts where the ear did.
+            left.rotate_left((at + 2) % 3);
+        }
     }
     // Outlines that cross themselves run out of ears: the rest becomes a fan.
     triangles.extend((2..left.len()).map(|i| [left[0], left[i - 1], left[i]]));
@@ -75,6 +80,20 @@ mod tests {
     fn convex_polygons_are_fans() {
         let square = [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y];
         assert_eq!(triangulate(&square, &mut 9), vec![[0, 1, 2], [0, 2, 3]]);
+    }
+
+    #[test]
+    fn quads_are_fans_from_one_corner_or_another() {
+        let arrow = [[0.0, 0.0], [4.0, 0.0], [1.0, 1.0], [0.0, 4.0]].map(|[x, y]| DVec3::new(x, y, 0.0));
+        for shift in 0..4 {
+            let mut turned = arrow;
+            turned.rotate_left(shift);
+            let triangles = triangulate(&turned, &mut 99);
+            let [[a, _, c], [d, e, _]] = triangles[..] else { panic!("{triangles:?}") };
+            assert_eq!((a, c), (d, e), "{triangles:?}");
+            // Two triangles of 4 x 1 on the axes.
+            assert!((area(&turned, &triangles) - 4.0).abs() < 1e-12, "{triangles:?}");
+        }
     }
 
     #[test]

@@ -1,6 +1,8 @@
 //! What the tests share: invariants of every mesh, and the folder of real assets.
 #![allow(dead_code)]
 
+pub mod plain;
+
 use std::path::{Path, PathBuf};
 
 use mesh::Mesh;
