@@ -2,7 +2,8 @@
 # Needed beforehand: Rust 1.90+, Python 3.10+ with venv, make and a C linker. .ci/setup and .ci/device do the rest.
 
 PY := .venv/bin/python
-CARGO_TEST := cargo test --release --locked --workspace --exclude python
+# The whole workspace, so that features resolve as for the wheel and its dependencies compile once.
+CARGO_TEST := cargo test --release --locked --workspace
 # In CI a missing Vulkan device fails the tests that need one; elsewhere they skip.
 ifdef CI
 export BUMPWGPU_REQUIRE_GPU := 1

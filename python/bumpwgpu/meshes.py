@@ -389,6 +389,9 @@ class Mesh:
     def tangents(self, method: str = "mikktspace") -> Tangents:
         """Tangent frames by some method; the mesh itself stays as it is.
 
+        Works on the triangles. An OBJ file with quads got the :attr:`vertex_tangents` of its quads when it
+        was opened, as Blender computes them; on triangles the same vertex may differ by some degrees.
+
         Parameters
         ----------
         method : {"mikktspace", "dietrich"}
