@@ -25,8 +25,9 @@ HeightRange: TypeAlias = "Literal['auto'] | tuple[float, float] | None"
 
 #: Resampling filters overshoot by up to this much; such heights are clipped with a warning.
 OVERSHOOT = 0.01
-#: Channels that differ by no more than one level of 8 bits are the same grey.
-GREY_TOLERANCE = 1.0 / 255.0
+#: Channels that differ by no more than two levels of 8 bits are the same grey: palettes and lossy
+#: compression of a grey picture leave that much.
+GREY_TOLERANCE = 2.0 / 255.0
 _CHANNEL_NAMES = {"r": 0, "g": 1, "b": 2, "a": 3}
 
 
