@@ -1,7 +1,6 @@
 // A searched relief shaded from its slopes: search/*, surface/normal.
 #import "bindings/draw.wgsl"
 #import "bindings/frame.wgsl"
-#import "lib/normalize.wgsl"
 #import "lib/surface_point.wgsl"
 #import "shading/relief.wgsl"
 
@@ -36,13 +35,7 @@ fn vertex(in: VertexIn) -> Varyings {
 
 @fragment
 fn fragment(in: Varyings, @builtin(front_facing) front: bool) -> ReliefTargets {
-    // Seen from behind, a two-sided surface has its relief on that side.
-    let side = select(-1.0, 1.0, front);
-    var point: SurfacePoint;
-    point.surface = SurfaceFrame(in.dpdu, in.dpdv, side * normalize_or(in.normal, vec3f(0.0, 0.0, 1.0)));
-    point.tangent = vec4f(0.0);
-    point.uv = in.uv;
-    point.uv_dx = dpdx(in.uv);
-    point.uv_dy = dpdy(in.uv);
+    let surface = SurfaceFrame(in.dpdu, in.dpdv, in.normal);
+    let point = surface_point(surface, vec4f(0.0), in.uv, dpdx(in.uv), dpdy(in.uv), front);
     return shade_relief(in.position, point);
 }

@@ -1,11 +1,8 @@
 // A mesh whose normal comes from slopes: surface/bump, surface/normal.
 #import "bindings/draw.wgsl"
 #import "bindings/frame.wgsl"
-#import "lib/normalize.wgsl"
 #import "lib/surface_point.wgsl"
-#import "lib/targets.wgsl"
-#import "shading/shade.wgsl"
-#import "shading/shadow_none.wgsl"
+#import "shading/mesh.wgsl"
 
 struct VertexIn {
     @location(0) position: vec3f,
@@ -38,14 +35,7 @@ fn vertex(in: VertexIn) -> Varyings {
 
 @fragment
 fn fragment(in: Varyings, @builtin(front_facing) front: bool) -> Targets {
-    // Seen from behind, a two-sided surface has its relief on that side.
-    let side = select(-1.0, 1.0, front);
-    var point: SurfacePoint;
-    point.surface = SurfaceFrame(in.dpdu, in.dpdv, side * normalize_or(in.normal, vec3f(0.0, 0.0, 1.0)));
-    point.tangent = vec4f(0.0);
-    point.uv = in.uv;
-    point.uv_dx = dpdx(in.uv);
-    point.uv_dy = dpdy(in.uv);
-    let albedo = albedo_at(in.uv, point.uv_dx, point.uv_dy);
-    return targets(shade_mesh(in.position, shading_normal(point), in.uv, albedo));
+    let surface = SurfaceFrame(in.dpdu, in.dpdv, in.normal);
+    let point = surface_point(surface, vec4f(0.0), in.uv, dpdx(in.uv), dpdy(in.uv), front);
+    return shade_on_mesh(in.position, point);
 }
