@@ -7,6 +7,7 @@ import operator
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 #: Largest finite 32-bit float: what the core computes with.
 FLOAT32_MAX = float(np.finfo(np.float32).max)
@@ -89,3 +90,26 @@ def strings(name: str, value: Any, known: tuple[str, ...]) -> list[str]:
         if part not in known:
             raise ValueError(f"unknown name {part!r} in {name}; known: {', '.join(known)}")
     return list(dict.fromkeys(parts))
+
+
+def width_and_height(size: Any) -> tuple[int, int]:
+    """Two whole numbers out of one side or (width, height); their range is the caller's to check."""
+    if not isinstance(size, tuple | list):
+        side = whole("size", size)
+        return side, side
+    if len(size) != 2:
+        raise ValueError(f"size must be one number or (width, height), got {len(size)} numbers")
+    return whole("size[0]", size[0]), whole("size[1]", size[1])
+
+
+def rows(name: str, values: Any, width: int) -> NDArray[Any]:
+    """Numbers of shape (N, width); copied only when they are no array yet."""
+    try:
+        array = np.asarray(values)
+    except Exception as error:
+        raise ValueError(f"{name} is not an array of shape (N, {width}): {error}") from None
+    if array.dtype.kind not in "fiu":
+        raise TypeError(f"{name} must hold numbers, got dtype {array.dtype}")
+    if array.ndim != 2 or array.shape[1] != width:
+        raise ValueError(f"{name} must have shape (N, {width}), got {array.shape}")
+    return array

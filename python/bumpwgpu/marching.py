@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _bumpwgpu
-from ._checks import choice, flag, strings
+from ._checks import choice, flag, rows, strings
 from .heightmap import HeightMap
 from .techniques import Technique, get, marching
 
@@ -200,14 +200,7 @@ def _has_hardware() -> bool:
 
 def _rays(name: str, values: Any) -> NDArray[Any]:
     """(N, 3) float32 or float64, C-contiguous, aligned, native: copied only when it is not."""
-    try:
-        array = np.asarray(values)
-    except Exception as error:
-        raise ValueError(f"{name} is not an array of shape (N, 3): {error}") from None
-    if array.dtype.kind not in "fiu":
-        raise TypeError(f"{name} must hold numbers, got dtype {array.dtype}")
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise ValueError(f"{name} must have shape (N, 3), got {array.shape}")
+    array = rows(name, values, 3)
     if array.shape[0] == 0:
         raise ValueError(f"{name} is empty: there are no rays to march")
     dtype = np.float32 if array.dtype == np.float32 else np.float64

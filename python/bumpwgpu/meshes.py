@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _bumpwgpu
-from ._checks import choice, number, whole
+from ._checks import choice, number, rows, whole
 from ._images import read_encoded
 from .errors import BumpWarning
 from .heightmap import HeightMap
@@ -493,25 +493,13 @@ def _image(source: Path | bytes | None) -> Any:
     return read_encoded(source) if isinstance(source, bytes) else source
 
 
-def _numeric(name: str, values: ArrayLike, width: int) -> NDArray[Any]:
-    try:
-        array = np.asarray(values)
-    except Exception as error:
-        raise ValueError(f"{name} is not an array of shape (N, {width}): {error}") from None
-    if array.dtype.kind not in "fiu":
-        raise TypeError(f"{name} must hold numbers, got dtype {array.dtype}")
-    if array.ndim != 2 or array.shape[1] != width:
-        raise ValueError(f"{name} must have shape (N, {width}), got {array.shape}")
-    return array
-
-
 def _floats(name: str, values: ArrayLike, width: int) -> NDArray[np.float32]:
     with np.errstate(over="ignore"):
-        return np.require(_numeric(name, values, width), np.float32, ("C", "A"))
+        return np.require(rows(name, values, width), np.float32, ("C", "A"))
 
 
 def _triangles(values: ArrayLike) -> NDArray[np.uint32]:
-    array = _numeric("indices", values, 3)
+    array = rows("indices", values, 3)
     if array.dtype.kind == "f":
         raise TypeError(f"indices must be whole numbers, got dtype {array.dtype}")
     if array.size and (int(array.min()) < 0 or int(array.max()) > 0xFFFFFFFF):

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _bumpwgpu
-from ._checks import choice, whole
+from ._checks import choice, whole, width_and_height
 
 __all__ = ["NAMES", "heights"]
 
@@ -197,12 +197,7 @@ def heights(name: str, size: int | tuple[int, int], seed: int) -> NDArray[np.flo
         For a name that is no string, or a size or seed that is no whole number.
     """
     choice("height map", name, NAMES)
-    if isinstance(size, tuple | list):
-        if len(size) != 2:
-            raise ValueError(f"size must be one number or (width, height), got {len(size)} numbers")
-        width, height = whole("size[0]", size[0]), whole("size[1]", size[1])
-    else:
-        width = height = whole("size", size)
+    width, height = width_and_height(size)
     limit = _bumpwgpu.MAX_SIDE
     if not (1 <= width <= limit and 1 <= height <= limit) or width * height > MAX_TEXELS:
         raise ValueError(

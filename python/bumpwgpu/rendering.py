@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from . import _bumpwgpu
 from ._atomic import replace_file
-from ._checks import choice, flag, numbers, strings, whole
+from ._checks import choice, flag, numbers, strings, width_and_height
 from .errors import BumpWarning, RenderError
 from .meshes import Mesh
 from .scene import Camera, Light, Material
@@ -264,12 +264,7 @@ def render(
 
 
 def _size(size: Any) -> tuple[int, int]:
-    if isinstance(size, tuple | list):
-        if len(size) != 2:
-            raise ValueError(f"size must be one number or (width, height), got {len(size)} numbers")
-        width, height = whole("size[0]", size[0]), whole("size[1]", size[1])
-    else:
-        width = height = whole("size", size)
+    width, height = width_and_height(size)
     if width < 1 or height < 1:
         raise ValueError(f"size is {width} x {height}; each side must be at least 1")
     if width > MAX_SIDE or height > MAX_SIDE:
