@@ -56,6 +56,16 @@ pub enum HeightFieldError {
         /// Directions given.
         directions: usize,
     },
+    /// A place for results has the wrong length.
+    #[error("the array for {name} holds {got} numbers; these rays need {expected}")]
+    OutputLength {
+        /// Which result.
+        name: &'static str,
+        /// Numbers needed.
+        expected: usize,
+        /// Numbers there is room for.
+        got: usize,
+    },
     /// A ray has a component that is NaN or infinite.
     #[error("ray {index}: {what} is not finite")]
     RayNotFinite {

@@ -8,16 +8,20 @@
 
 pub mod error;
 pub mod field;
+pub mod hits;
 pub mod march;
 pub mod oracle;
 pub mod pyramid;
 pub mod ray;
+pub mod rays;
 pub mod search;
 pub mod technique;
 
 pub use error::HeightFieldError;
 pub use field::{Extent, HeightField, Wrap};
-pub use march::{Hits, MarchOptions, OutputSet, RayArray, march};
+pub use hits::{Hits, HitsMut, OutputSet};
+pub use march::{MarchOptions, march, march_into};
 pub use pyramid::MaxPyramid;
 pub use ray::{Found, Segment, Status};
+pub use rays::RayArray;
 pub use technique::{Parameter, Technique, TechniqueInfo};

@@ -1,108 +1,19 @@
 //! Many rays at once: any technique over arrays of rays, on all cores.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
+use crate::rays::{fault_of, first_unsound, same_count};
 use crate::search::Search;
 use crate::search::exact::{self, CellRay};
-use crate::{HeightField, HeightFieldError, Segment, Status, Technique, Wrap};
+use crate::{HeightField, HeightFieldError, Hits, HitsMut, OutputSet, RayArray, Segment};
+use crate::{Status, Technique, Wrap};
+
+pub use crate::rays::validate;
 
 /// Rays handed to one task at a time.
 const CHUNK: usize = 4096;
-
-/// Ray origins or directions: N * 3 numbers, `(u, v, z)` after one another.
-///
-/// `f64` rays are followed in `f64` by the exact search and rounded for the others.
-#[derive(Debug, Clone, Copy)]
-pub enum RayArray<'a> {
-    /// Single precision.
-    F32(&'a [f32]),
-    /// Double precision.
-    F64(&'a [f64]),
-}
-
-impl<'a> RayArray<'a> {
-    /// Number of rays.
-    #[inline(always)]
-    pub fn len(&self) -> usize {
-        match self {
-            Self::F32(a) => a.len() / 3,
-            Self::F64(a) => a.len() / 3,
-        }
-    }
-
-    /// Whether there are none.
-    #[inline(always)]
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// Ray `i`.
-    #[inline(always)]
-    pub fn get(&self, i: usize) -> [f64; 3] {
-        match self {
-            Self::F32(a) => [a[3 * i], a[3 * i + 1], a[3 * i + 2]].map(f64::from),
-            Self::F64(a) => [a[3 * i], a[3 * i + 1], a[3 * i + 2]],
-        }
-    }
-
-    fn slice(&self, from: usize, to: usize) -> Self {
-        match self {
-            Self::F32(a) => Self::F32(&a[3 * from..3 * to]),
-            Self::F64(a) => Self::F64(&a[3 * from..3 * to]),
-        }
-    }
-}
-
-/// Which results are wanted; the others are neither computed nor allocated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct OutputSet(u8);
-
-impl OutputSet {
-    /// Nothing.
-    pub const NONE: Self = Self(0);
-    /// Ray parameter of the hit.
-    pub const T: Self = Self(1);
-    /// Texture coordinates of the hit.
-    pub const UV: Self = Self(2);
-    /// Height of the hit.
-    pub const Z: Self = Self(4);
-    /// Surface normal at the hit.
-    pub const NORMAL: Self = Self(8);
-    /// Steps taken.
-    pub const STEPS: Self = Self(16);
-    /// How the search ended.
-    pub const STATUS: Self = Self(32);
-    /// Everything.
-    pub const ALL: Self = Self(63);
-
-    /// Whether all of `other` is in the set.
-    #[inline(always)]
-    pub fn contains(self, other: Self) -> bool {
-        self.0 & other.0 == other.0
-    }
-
-    /// The set of one output by its Python name.
-    pub fn named(name: &str) -> Option<Self> {
-        Some(match name {
-            "t" => Self::T,
-            "uv" => Self::UV,
-            "z" => Self::Z,
-            "normal" => Self::NORMAL,
-            "steps" => Self::STEPS,
-            "status" => Self::STATUS,
-            _ => return None,
-        })
-    }
-}
-
-impl std::ops::BitOr for OutputSet {
-    type Output = Self;
-    fn bitor(self, other: Self) -> Self {
-        Self(self.0 | other.0)
-    }
-}
 
 /// How to march.
 #[derive(Debug, Clone, Copy)]
@@ -121,25 +32,6 @@ impl Default for MarchOptions<'_> {
     fn default() -> Self {
         Self { outputs: OutputSet::ALL, from_surface: false, cancel: None }
     }
-}
-
-/// Results, one entry a ray, for the outputs that were asked for.
-///
-/// Rays without a hit have `t = inf` and NaN in `uv`, `z` and `normal`.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Hits {
-    /// Ray parameter, N.
-    pub t: Option<Vec<f32>>,
-    /// Texture coordinates on the ray's own tile, N * 2.
-    pub uv: Option<Vec<f32>>,
-    /// Height in 0..1, N.
-    pub z: Option<Vec<f32>>,
-    /// Unit normal of the bilinear surface in texture space, `(-dh/du, -dh/dv, 1)` normalised, N * 3.
-    pub normal: Option<Vec<f32>>,
-    /// Height reads or nodes visited, N.
-    pub steps: Option<Vec<u32>>,
-    /// [`Status`] as a number, N.
-    pub status: Option<Vec<u8>>,
 }
 
 /// A run of rays and the places their results go.
@@ -314,69 +206,66 @@ pub fn march(
     directions: RayArray<'_>,
     options: &MarchOptions<'_>,
 ) -> Result<Hits, HeightFieldError> {
-    validate(origins, directions)?;
+    same_count(origins, directions)?;
+    let mut hits = Hits::new(origins.len(), options.outputs);
+    march_into(field, technique, origins, directions, options, hits.as_mut())?;
+    Ok(hits)
+}
+
+/// As [`march`], into places of the caller's; these say what is wanted, not `options.outputs`.
+///
+/// Each task checks its rays just before it follows them, while they are in the cache. After an error
+/// the places hold anything.
+///
+/// # Errors
+/// As [`march`], and [`HeightFieldError::OutputLength`].
+pub fn march_into(
+    field: &HeightField,
+    technique: &Technique,
+    origins: RayArray<'_>,
+    directions: RayArray<'_>,
+    options: &MarchOptions<'_>,
+    mut places: HitsMut<'_>,
+) -> Result<(), HeightFieldError> {
+    same_count(origins, directions)?;
     let n = origins.len();
-    let wants = |output| options.outputs.contains(output);
-    let mut hits = Hits {
-        t: wants(OutputSet::T).then(|| vec![0.0; n]),
-        uv: wants(OutputSet::UV).then(|| vec![0.0; 2 * n]),
-        z: wants(OutputSet::Z).then(|| vec![0.0; n]),
-        normal: wants(OutputSet::NORMAL).then(|| vec![0.0; 3 * n]),
-        steps: wants(OutputSet::STEPS).then(|| vec![0; n]),
-        status: wants(OutputSet::STATUS).then(|| vec![0; n]),
-    };
-    let mut t = hits.t.as_mut().map(|v| v.chunks_mut(CHUNK));
-    let mut uv = hits.uv.as_mut().map(|v| v.chunks_mut(2 * CHUNK));
-    let mut z = hits.z.as_mut().map(|v| v.chunks_mut(CHUNK));
-    let mut normal = hits.normal.as_mut().map(|v| v.chunks_mut(3 * CHUNK));
-    let mut steps = hits.steps.as_mut().map(|v| v.chunks_mut(CHUNK));
-    let mut status = hits.status.as_mut().map(|v| v.chunks_mut(CHUNK));
+    places.check(n)?;
     let chunks: Vec<Chunk<'_>> = (0..n)
         .step_by(CHUNK)
         .map(|from| {
             let to = (from + CHUNK).min(n);
+            let HitsMut { t, uv, z, normal, steps, status } = places.split_front(to - from);
             Chunk {
                 origins: origins.slice(from, to),
                 directions: directions.slice(from, to),
                 from_surface: options.from_surface,
                 cancel: options.cancel,
-                t: t.as_mut().and_then(Iterator::next),
-                uv: uv.as_mut().and_then(Iterator::next),
-                z: z.as_mut().and_then(Iterator::next),
-                normal: normal.as_mut().and_then(Iterator::next),
-                steps: steps.as_mut().and_then(Iterator::next),
-                status: status.as_mut().and_then(Iterator::next),
+                t,
+                uv,
+                z,
+                normal,
+                steps,
+                status,
             }
         })
         .collect();
-    chunks.into_par_iter().try_for_each(|mut chunk| {
-        (technique.info.march)(field, &technique.values, &mut chunk);
+    // The first ray at fault: what lies after it need not be looked at, what lies before it must be.
+    let fault = AtomicUsize::new(usize::MAX);
+    chunks.into_par_iter().enumerate().try_for_each(|(at, mut chunk)| {
+        let (from, known) = (at * CHUNK, fault.load(Ordering::Relaxed));
+        if known < from {
+            return Ok(());
+        }
+        if let Some(index) = first_unsound(chunk.origins, chunk.directions) {
+            fault.fetch_min(from + index, Ordering::Relaxed);
+        } else if known == usize::MAX {
+            (technique.info.march)(field, &technique.values, &mut chunk);
+        }
         if chunk.cancelled() { Err(HeightFieldError::Interrupted) } else { Ok(()) }
     })?;
-    Ok(hits)
-}
-
-/// Checks that every ray is finite and has a direction.
-///
-/// # Errors
-/// As [`march`].
-pub fn validate(origins: RayArray<'_>, directions: RayArray<'_>) -> Result<(), HeightFieldError> {
-    if origins.len() != directions.len() {
-        return Err(HeightFieldError::RayCount { origins: origins.len(), directions: directions.len() });
-    }
-    let fault = (0..origins.len()).into_par_iter().with_min_len(CHUNK).find_first(|&i| {
-        let d = directions.get(i);
-        !origins.get(i).iter().chain(&d).all(|x| x.is_finite()) || d == [0.0; 3]
-    });
-    match fault {
-        None => Ok(()),
-        Some(index) if !origins.get(index).iter().all(|x| x.is_finite()) => {
-            Err(HeightFieldError::RayNotFinite { index, what: "origin" })
-        }
-        Some(index) if !directions.get(index).iter().all(|x| x.is_finite()) => {
-            Err(HeightFieldError::RayNotFinite { index, what: "direction" })
-        }
-        Some(index) => Err(HeightFieldError::RayZeroDirection { index }),
+    match fault.into_inner() {
+        usize::MAX => Ok(()),
+        index => Err(fault_of(origins, directions, index)),
     }
 }
 

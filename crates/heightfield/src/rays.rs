@@ -1,0 +1,154 @@
+//! Arrays of rays, and which rays nothing can follow.
+
+use num_traits::Float;
+use rayon::prelude::*;
+
+use crate::HeightFieldError;
+
+/// Rays looked at by one task at a time.
+const CHUNK: usize = 1 << 14;
+
+/// Ray origins or directions: N * 3 numbers, `(u, v, z)` after one another.
+///
+/// `f64` rays are followed in `f64` by the exact search and rounded for the others.
+#[derive(Debug, Clone, Copy)]
+pub enum RayArray<'a> {
+    /// Single precision.
+    F32(&'a [f32]),
+    /// Double precision.
+    F64(&'a [f64]),
+}
+
+impl<'a> RayArray<'a> {
+    /// Number of rays.
+    #[inline(always)]
+    pub fn len(&self) -> usize {
+        match self {
+            Self::F32(a) => a.len() / 3,
+            Self::F64(a) => a.len() / 3,
+        }
+    }
+
+    /// Whether there are none.
+    #[inline(always)]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Ray `i`.
+    #[inline(always)]
+    pub fn get(&self, i: usize) -> [f64; 3] {
+        match self {
+            Self::F32(a) => [a[3 * i], a[3 * i + 1], a[3 * i + 2]].map(f64::from),
+            Self::F64(a) => [a[3 * i], a[3 * i + 1], a[3 * i + 2]],
+        }
+    }
+
+    /// Rays `from` up to `to`.
+    #[inline(always)]
+    pub fn slice(&self, from: usize, to: usize) -> Self {
+        match self {
+            Self::F32(a) => Self::F32(&a[3 * from..3 * to]),
+            Self::F64(a) => Self::F64(&a[3 * from..3 * to]),
+        }
+    }
+}
+
+/// Checks that every ray is finite and has a direction.
+///
+/// # Errors
+/// [`HeightFieldError::RayCount`]; [`HeightFieldError::RayNotFinite`] and
+/// [`HeightFieldError::RayZeroDirection`] name the first offending ray.
+pub fn validate(origins: RayArray<'_>, directions: RayArray<'_>) -> Result<(), HeightFieldError> {
+    same_count(origins, directions)?;
+    let n = origins.len();
+    let fault = (0..n.div_ceil(CHUNK)).into_par_iter().find_map_first(|k| {
+        let (from, to) = (k * CHUNK, ((k + 1) * CHUNK).min(n));
+        first_unsound(origins.slice(from, to), directions.slice(from, to)).map(|at| from + at)
+    });
+    fault.map_or(Ok(()), |index| Err(fault_of(origins, directions, index)))
+}
+
+/// Checks that there are as many origins as directions.
+pub(crate) fn same_count(origins: RayArray<'_>, directions: RayArray<'_>) -> Result<(), HeightFieldError> {
+    if origins.len() == directions.len() {
+        return Ok(());
+    }
+    Err(HeightFieldError::RayCount { origins: origins.len(), directions: directions.len() })
+}
+
+/// The first ray that is not finite or has no direction.
+pub(crate) fn first_unsound(origins: RayArray<'_>, directions: RayArray<'_>) -> Option<usize> {
+    let sound = match origins {
+        RayArray::F32(a) => all_finite(a),
+        RayArray::F64(a) => all_finite(a),
+    } && match directions {
+        RayArray::F32(a) => all_directed(a),
+        RayArray::F64(a) => all_directed(a),
+    };
+    if sound {
+        return None;
+    }
+    (0..origins.len()).find(|&i| {
+        let direction = directions.get(i);
+        !finite(origins.get(i)) || !finite(direction) || direction == [0.0; 3]
+    })
+}
+
+/// What is wrong with a ray that [`first_unsound`] found.
+pub(crate) fn fault_of(origins: RayArray<'_>, directions: RayArray<'_>, index: usize) -> HeightFieldError {
+    if !finite(origins.get(index)) {
+        HeightFieldError::RayNotFinite { index, what: "origin" }
+    } else if !finite(directions.get(index)) {
+        HeightFieldError::RayNotFinite { index, what: "direction" }
+    } else {
+        HeightFieldError::RayZeroDirection { index }
+    }
+}
+
+fn finite(ray: [f64; 3]) -> bool {
+    ray.iter().all(|x| x.is_finite())
+}
+
+/// Without an early way out, so that it compiles to vector instructions: rays are sound as a rule.
+fn all_finite<T: Float>(values: &[T]) -> bool {
+    values.iter().fold(true, |sound, x| sound & x.is_finite())
+}
+
+fn all_directed<T: Float>(directions: &[T]) -> bool {
+    let zero = T::zero();
+    directions.chunks_exact(3).fold(true, |sound, d| {
+        let finite = d[0].is_finite() & d[1].is_finite() & d[2].is_finite();
+        sound & finite & ((d[0] != zero) | (d[1] != zero) | (d[2] != zero))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_offending_ray_is_named() {
+        let n = 3 * CHUNK;
+        let good = vec![0.5_f32; 3 * n];
+        let at = |ray: usize, values: [f32; 3]| {
+            let mut array = good.clone();
+            array[3 * ray..3 * ray + 3].copy_from_slice(&values);
+            array
+        };
+        let judge = |o: &[f32], d: &[f32]| validate(RayArray::F32(o), RayArray::F32(d));
+        assert_eq!(judge(&good, &good), Ok(()));
+        for ray in [0, 1, CHUNK - 1, CHUNK, n - 1] {
+            let (nan, zero) = (at(ray, [0.1, 0.2, f32::NAN]), at(ray, [0.0, -0.0, 0.0]));
+            let infinite = at(ray, [0.1, f32::NEG_INFINITY, 1.0]);
+            let fault = |what| Err(HeightFieldError::RayNotFinite { index: ray, what });
+            assert_eq!(judge(&nan, &good), fault("origin"));
+            assert_eq!(judge(&good, &nan), fault("direction"));
+            assert_eq!(judge(&infinite, &zero), fault("origin"));
+            assert_eq!(judge(&good, &zero), Err(HeightFieldError::RayZeroDirection { index: ray }));
+            assert_eq!(judge(&zero, &good), Ok(()));
+        }
+        let (two, three) = (&good[..6], &good[..9]);
+        assert_eq!(judge(two, three), Err(HeightFieldError::RayCount { origins: 2, directions: 3 }));
+    }
+}
