@@ -44,7 +44,8 @@ test-rust: setup ## the Rust tests
 test-python: extension ## the Python tests but the slow ones
 	$(PY) -m pytest -m "not slow"
 
-test-slow: extension ## the slow tests: the whole demo, the wheel out of the source distribution
+test-slow: extension ## the slow tests: a hundred million rays, the whole demo, the wheel out of the source distribution
+	$(CARGO_TEST) -- --ignored --nocapture
 	$(PY) -m pytest -m slow
 
 wheel: setup ## one abi3 wheel and a source distribution in dist/

@@ -99,3 +99,108 @@ fn a_cancelled_batch_says_so() {
     let error = march(&field, &exact, RayArray::F32(&rays.0), RayArray::F32(&rays.1), &options).unwrap_err();
     assert_eq!(error, HeightFieldError::Interrupted);
 }
+
+/// Finite rays that overflow, underflow or never end once they are clipped and scaled.
+fn hostile(at: usize) -> ([f32; 3], [f32; 3]) {
+    let (huge, tiny) = (f32::MAX, f32::from_bits(1));
+    let rays = [
+        ([0.5, 0.5, huge], [1.0, 1.0, -tiny]),
+        ([huge, -huge, 1.0], [huge, huge, -huge]),
+        ([0.5, 0.5, 0.5], [huge, 0.0, 0.0]),
+        ([0.5, 0.5, 1.0], [tiny, tiny, -tiny]),
+        ([0.5, 0.5, 1.0], [0.0, -0.0, -huge]),
+        ([0.5, 0.5, -huge], [0.1, 0.1, huge]),
+        ([-0.0, tiny, 1.0], [huge, tiny, -1.0]),
+        ([1e30, 1e-30, 1e30], [-1e30, 1e-30, -1e30]),
+        ([0.3, 0.3, 0.999], [1.0, 1e-30, -1e-30]),
+        ([0.5, 0.5, 2.0], [1.0, 1.0, 0.0]),
+        ([0.5, 0.5, 1.0], [0.3, 0.2, huge]),
+    ];
+    rays[at % rays.len()]
+}
+
+/// Bits of everything a batch gives for some of its rays.
+fn bits(
+    field: &HeightField,
+    technique: &Technique,
+    rays: &(Vec<f32>, Vec<f32>),
+    kept: &[usize],
+) -> Vec<[u32; 9]> {
+    let mut hits = Hits::new(rays.0.len() / 3, OutputSet::ALL);
+    into(field, technique, rays, hits.as_mut()).unwrap();
+    let places = [hits.t.unwrap(), hits.z.unwrap(), hits.uv.unwrap(), hits.normal.unwrap()];
+    let (steps, status) = (hits.steps.unwrap(), hits.status.unwrap());
+    kept.iter()
+        .map(|&i| {
+            let [t, z, uv, n] = &places;
+            let floats = [t[i], z[i], uv[2 * i], uv[2 * i + 1], n[3 * i], n[3 * i + 1], n[3 * i + 2]];
+            let [a, b, c, d, e, f, g] = floats.map(f32::to_bits);
+            [a, b, c, d, e, f, g, steps[i], u32::from(status[i])]
+        })
+        .collect()
+}
+
+#[test]
+fn no_ray_depends_on_its_neighbours() {
+    let n = 150;
+    let (origins, directions) = rays();
+    let all = (origins[..3 * n].to_vec(), directions[..3 * n].to_vec());
+    let everyone: Vec<usize> = (0..n).collect();
+    for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
+        let field = noise(61, 47, wrap, 3);
+        for info in Technique::all() {
+            let technique = Technique::named(info.name).unwrap();
+            let together = bits(&field, &technique, &all, &everyone);
+            // In other company: batches of every length up to more than two packets of any width.
+            let mut at = 0;
+            let mut length = 1;
+            while at < n {
+                let to = (at + length).min(n);
+                let part = (all.0[3 * at..3 * to].to_vec(), all.1[3 * at..3 * to].to_vec());
+                let kept: Vec<usize> = (0..to - at).collect();
+                assert_eq!(bits(&field, &technique, &part, &kept), together[at..to], "{} at {at}", info.name);
+                (at, length) = (to, length % 40 + 1);
+            }
+            // Among rays that overflow and underflow, in every place of a packet.
+            let mut mixed = (Vec::new(), Vec::new());
+            let mut kept = Vec::new();
+            for i in 0..n {
+                for _ in 0..i % 4 {
+                    let (o, d) = hostile(mixed.0.len() / 3);
+                    mixed.0.extend(o);
+                    mixed.1.extend(d);
+                }
+                kept.push(mixed.0.len() / 3);
+                mixed.0.extend(&all.0[3 * i..3 * i + 3]);
+                mixed.1.extend(&all.1[3 * i..3 * i + 3]);
+            }
+            let among = bits(&field, &technique, &mixed, &kept);
+            let changed = among.iter().zip(&together).position(|(a, b)| a != b);
+            assert_eq!(changed, None, "{} {wrap:?}", info.name);
+        }
+    }
+}
+
+#[test]
+fn hostile_rays_end_and_give_numbers() {
+    for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
+        let field = noise(61, 47, wrap, 3);
+        let rays: (Vec<_>, Vec<_>) = (0..88).map(hostile).unzip();
+        let rays = (rays.0.concat(), rays.1.concat());
+        for info in Technique::all() {
+            let technique = Technique::named(info.name).unwrap();
+            let mut hits = Hits::new(88, OutputSet::T | OutputSet::STATUS);
+            into(&field, &technique, &rays, hits.as_mut()).unwrap();
+            let (t, status) = (hits.t.unwrap(), hits.status.unwrap());
+            for (i, (t, status)) in t.into_iter().zip(status).enumerate() {
+                assert!(
+                    !t.is_nan() && status <= 2,
+                    "{} {wrap:?}, ray {:?}: {t} {status}",
+                    info.name,
+                    hostile(i)
+                );
+                assert!(t >= 0.0, "{} {wrap:?}, ray {:?}: {t}", info.name, hostile(i));
+            }
+        }
+    }
+}
