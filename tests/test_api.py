@@ -19,7 +19,7 @@ import pytest
 
 import bumpwgpu as bw
 from bumpwgpu import _bumpwgpu, techniques
-from bumpwgpu.baking import KERNELS, MAPS
+from bumpwgpu.baking import MAPS
 from bumpwgpu.rendering import AOVS
 
 PACKAGE = Path(bw.__file__).parent
@@ -33,7 +33,7 @@ SIGNATURES = {
     "HeightMap": "source * scale base tile_size wrap channel invert height_range",
     "HeightMap.procedural": "name size seed * scale base tile_size wrap",
     "march": "height_map origins directions technique * device outputs from_surface",
-    "bake": "source maps * kernel convention progress **options",
+    "bake": "source maps * progress **options",
     "Maps.save": "self folder * format bits prefix",
     "Mesh": "positions indices uvs * normals tangents",
     "Mesh.open": "path",
@@ -195,13 +195,8 @@ def test_technique_objects() -> None:
 
 
 def test_names_agree_with_the_core() -> None:
-    maps, kernels = _bumpwgpu.bake_names()
-    assert [name for name, _ in maps] == list(MAPS)
-    assert tuple(kernels) == KERNELS
+    assert [entry["name"] for entry in _bumpwgpu.map_registry()] == list(MAPS)
     assert tuple(_bumpwgpu.aov_names()) == AOVS
-    from bumpwgpu.cli import KernelChoice
-
-    assert [choice.value for choice in KernelChoice] == list(KERNELS)
 
 
 def python(code: str) -> str:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 import bumpwgpu as bw
-from bumpwgpu.baking import CONVENTIONS, KERNELS, MAPS
+from bumpwgpu.baking import CONVENTIONS, KERNELS, MAPS, about, estimate
 
 # Derivative along one axis and smoothing across it, taps from -2 to +2; from the published definitions.
 TAPS = {
@@ -93,13 +93,13 @@ def test_maps_agree_with_each_other() -> None:
     hm = rough()
     maps = bw.bake(hm, maps=MAPS)
     assert list(maps) == list(MAPS)
-    assert len(maps) == 4
+    assert len(maps) == len(MAPS)
     np.testing.assert_array_equal(maps["normal_xy"], maps["normal"][:, :, :2])
     np.testing.assert_array_equal(maps["relief"][:, :, :3], maps["normal"])
     np.testing.assert_array_equal(maps["relief"][:, :, 3], hm.array)
     assert "normal (18, 23, 3)" in repr(maps)
     with pytest.raises(KeyError):
-        maps["cone"]
+        maps["cones"]
 
 
 @pytest.mark.parametrize("size", [(16, 16), (23, 18), (1, 7), (1, 1), (5, 1)])
@@ -175,7 +175,7 @@ def test_saved_pyramids_stay_bounds(tmp_path: Path) -> None:
 def test_progress_counts_up_to_the_end() -> None:
     seen: list[tuple[int, int]] = []
     bw.bake(rough(), MAPS, progress=lambda done, total: seen.append((done, total)))
-    assert seen[-1] == (72, 72)
+    assert seen[-1] == (18 * len(MAPS), 18 * len(MAPS))
     assert [done for done, _ in seen] == sorted({done for done, _ in seen})
 
 
@@ -196,9 +196,53 @@ def test_progress_may_bake_itself() -> None:
     assert inner
 
 
+def test_options_of_maps() -> None:
+    hm = rough()
+    with pytest.warns(bw.BumpWarning, match=r"kernel has no effect.*only normal, normal_xy, relief"):
+        bw.bake(hm, "pyramid", kernel="scharr")
+    with pytest.raises(ValueError, match="scharr"):
+        bw.bake(hm, "pyramid", kernel="roberts")
+    with pytest.raises(
+        TypeError, match=r"unexpected options kernal; normal, pyramid takes kernel, convention"
+    ):
+        bw.bake(hm, ("normal", "pyramid"), kernal="scharr")
+    with pytest.raises(TypeError, match="pyramid takes no options"):
+        bw.bake(hm, "pyramid", depth=3)
+    with pytest.raises(TypeError, match="string"):
+        bw.bake(hm, kernel=3)
+
+
+def test_every_map_is_described() -> None:
+    hm = rough()
+    for name in MAPS:
+        info = about(name)
+        assert info.summary
+        assert info.source
+        made = bw.bake(hm, name, **{option.name: option.default for option in info.options})[name]
+        layers = made if info.form == "levels" else (made,)
+        ndim = 2 + (len(info.channels) > 1) + (info.form == "stack")
+        assert all(layer.ndim == ndim and layer.dtype == np.float32 for layer in layers)
+        size, working = estimate((23, 18), name)
+        assert size == sum(layer.nbytes for layer in layers)
+        assert working >= 0
+        for at, channel in enumerate(info.channels):
+            if channel.range is not None:
+                planes = [layer if len(info.channels) == 1 else layer[..., at] for layer in layers]
+                low, high = channel.range
+                assert all(low <= plane.min() and plane.max() <= high for plane in planes), name
+        for option in info.options:
+            assert option.describe()
+            with pytest.raises(TypeError):
+                option.check(None)
+    with pytest.raises(ValueError, match="normal, normal_xy"):
+        about("cones")
+    with pytest.raises(ValueError, match="size"):
+        estimate((0, 4), "normal")
+
+
 def test_refused(tmp_path: Path) -> None:
     hm = rough()
-    for maps in ("cone", ("normal", "horizon"), ""):
+    for maps in ("cones", ("normal", "horizons"), ""):
         with pytest.raises(ValueError, match="normal, normal_xy, relief, pyramid"):
             bw.bake(hm, maps)
     with pytest.raises(ValueError, match="empty"):

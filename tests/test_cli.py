@@ -18,6 +18,7 @@ from PIL import Image
 
 import bumpwgpu as bw
 from bumpwgpu import cli
+from bumpwgpu.baking import MAPS, about
 
 
 def run(*words: object, cwd: Path) -> subprocess.CompletedProcess[str]:
@@ -52,6 +53,13 @@ def test_bake_options_reach_the_bake(folder: Path) -> None:
     hm = bw.HeightMap(folder / "height.png", scale=0.5, tile_size=(2, 1), wrap="clamp", invert=True)
     expected = bw.bake(hm, kernel="scharr", convention="directx")["normal"]
     np.testing.assert_array_equal(np.load(folder / "wall_normal.npy"), expected)
+
+
+def test_every_option_of_every_map_is_a_flag(folder: Path) -> None:
+    text = run("bake", "--help", cwd=folder).stdout
+    for name in MAPS:
+        for option in about(name).options:
+            assert f"--{option.name.replace('_', '-')} " in text
 
 
 def test_json_and_quiet(folder: Path) -> None:
@@ -121,7 +129,7 @@ USAGE = [
     "",
     "paint height.png",
     "bake",
-    "bake height.png --maps cone",
+    "bake height.png --maps cones",
     "bake height.png --kernel roberts",
     "bake height.png --bits 12",
     "bake height.png --scale -1",
@@ -178,7 +186,6 @@ def test_errors_are_one_line(line: str, message: str, folder: Path) -> None:
 def test_defaults_are_those_of_the_api() -> None:
     pairs = [
         (cli.bake, bw.HeightMap, ("scale", "base", "tile_size", "wrap", "channel", "invert", "height_range")),
-        (cli.bake, bw.bake, ("kernel", "convention")),
         (cli.bake, bw.Maps.save, ("format", "bits", "prefix")),
         (cli.render, bw.Material, ("albedo", "normal", "specular", "shininess")),
         (cli.render, bw.render, ("size", "technique", "shadows")),

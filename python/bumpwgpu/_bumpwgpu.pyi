@@ -12,6 +12,7 @@ _Path: TypeAlias = str | os.PathLike[str]
 _Parameters: TypeAlias = Sequence[tuple[str, float]]
 _Setting: TypeAlias = tuple[str, _Parameters]
 _Progress: TypeAlias = Callable[..., object] | None
+_Options: TypeAlias = Sequence[tuple[str, bool | int | float | str]]
 _Vector: TypeAlias = tuple[float, float, float]
 _Color: TypeAlias = tuple[float, float, float, float]
 _Decoded: TypeAlias = tuple[NDArray[Any], list[str], list[str]]
@@ -32,12 +33,13 @@ __all__ = [
     "adapters",
     "aov_names",
     "bake_map",
-    "bake_names",
     "compare_front",
     "compare_planar",
     "compare_recommend",
     "decode_image",
     "effective_bits",
+    "map_bytes",
+    "map_registry",
     "march",
     "march_gpu",
     "read_image",
@@ -178,13 +180,11 @@ def aov_names() -> list[str]: ...
 def bake_map(
     field: Field,
     map: str,
-    kernel: str,
-    convention: str,
+    options: _Options,
     progress: _Progress,
     first: int,
     total: int,
 ) -> list[NDArray[np.float32]]: ...
-def bake_names() -> tuple[list[tuple[str, str]], list[str]]: ...
 def compare_front(
     measured: Sequence[tuple[str, Sequence[float], float, float]], max_failure_rate: float
 ) -> list[tuple[int, list[int]]]: ...
@@ -205,6 +205,8 @@ def compare_recommend(
 ) -> tuple[int | None, str]: ...
 def decode_image(data: bytes) -> _Decoded: ...
 def effective_bits(samples: NDArray[Any]) -> int: ...
+def map_bytes(map: str, options: _Options, width: int, height: int, wrap: str) -> tuple[int, int]: ...
+def map_registry() -> list[dict[str, Any]]: ...
 def march(
     field: Field,
     origins: NDArray[Any],

@@ -14,24 +14,100 @@ from numpy.typing import NDArray
 
 from . import _bumpwgpu
 from ._atomic import replace_file
-from ._checks import choice
+from ._checks import choice, width_and_height
+from ._map_info import MAPS as _INFO
+from ._map_info import OPTIONS, MapChannel, MapInfo, MapOption, listing, takers
 from .errors import BakeError, BumpWarning
-from .heightmap import HeightMap, HeightSource
+from .heightmap import HEIGHT_MAP_SETTINGS, HeightMap, HeightSource, Wrap
 from .meshes import Mesh
 
-__all__ = ["CONVENTIONS", "KERNELS", "MAPS", "Maps", "Progress", "bake"]
+__all__ = [
+    "CONVENTIONS",
+    "KERNELS",
+    "MAPS",
+    "MapChannel",
+    "MapInfo",
+    "MapOption",
+    "Maps",
+    "Progress",
+    "about",
+    "bake",
+    "estimate",
+]
 
 Progress: TypeAlias = Callable[[int, int], object]
-Kernel: TypeAlias = Literal["forward", "central", "sobel3", "sobel5", "scharr", "prewitt", "bilinear"]
-Convention: TypeAlias = Literal["opengl", "directx"]
 
-_maps, _kernels = _bumpwgpu.bake_names()
 #: Maps that can be baked.
-MAPS: tuple[str, ...] = tuple(name for name, _ in _maps)
+MAPS: tuple[str, ...] = tuple(_INFO)
 #: Slope kernels.
-KERNELS: tuple[str, ...] = tuple(_kernels)
+KERNELS: tuple[str, ...] = OPTIONS["kernel"][0].choices
 #: Which way green points.
-CONVENTIONS = ("opengl", "directx")
+CONVENTIONS: tuple[str, ...] = OPTIONS["convention"][0].choices
+
+
+def about(name: str) -> MapInfo:
+    """What a map is: its options, channels, source.
+
+    Parameters
+    ----------
+    name : str
+        One of :data:`MAPS`.
+
+    Returns
+    -------
+    MapInfo
+
+    Raises
+    ------
+    ValueError
+        An unknown map.
+
+    Examples
+    --------
+    >>> from bumpwgpu import baking
+    >>> info = baking.about("normal")
+    >>> [option.name for option in info.options], [channel.name for channel in info.channels]
+    (['kernel', 'convention'], ['x', 'y', 'z'])
+    """
+    return _INFO[choice("map", name, MAPS)]
+
+
+def estimate(size: tuple[int, int], name: str, *, wrap: Wrap = "repeat", **options: Any) -> tuple[int, int]:
+    """Bytes of a map before it is baked, and those its bake needs besides.
+
+    Parameters
+    ----------
+    size : (int, int)
+        Width and height of the height map.
+    name : str
+        One of :data:`MAPS`.
+    wrap : {"repeat", "clamp", "mirror"}
+        As for :class:`HeightMap`.
+    **options
+        What the map takes.
+
+    Returns
+    -------
+    (int, int)
+
+    Raises
+    ------
+    ValueError, TypeError
+        An unknown map or option, a value out of range.
+
+    Examples
+    --------
+    >>> from bumpwgpu import baking
+    >>> baking.estimate((1024, 1024), "normal")
+    (12582912, 0)
+    """
+    info = about(name)
+    width, height = width_and_height(size)
+    if not (1 <= width <= _bumpwgpu.MAX_SIDE and 1 <= height <= _bumpwgpu.MAX_SIDE):
+        raise ValueError(f"size must be 1..{_bumpwgpu.MAX_SIDE} each way, got ({width}, {height})")
+    _refuse_unknown(options, [name])
+    choice("wrap", wrap, ("repeat", "clamp", "mirror"))
+    return _bumpwgpu.map_bytes(name, list(info.complete(options).items()), width, height, wrap)
 
 
 class Maps(Mapping[str, Any]):
@@ -40,7 +116,8 @@ class Maps(Mapping[str, Any]):
     ``maps["normal"]``, ``["normal_xy"]`` and ``["relief"]`` are float32 arrays of shape (H, W, 3),
     (H, W, 2) and (H, W, 4): unit normals in -1..1 (+X right, +Y up unless baked otherwise, +Z out),
     and height in 0..1. ``maps["pyramid"]`` is a tuple of (h, w, 2) arrays, finest first: the lowest
-    and the highest point of ever larger blocks of the bilinear surface.
+    and the highest point of ever larger blocks of the bilinear surface. Maps of one channel have
+    shape (H, W), stacks of slices (N, H, W); :func:`bumpwgpu.baking.about` describes each map.
     """
 
     __slots__ = ("_layers",)
@@ -50,7 +127,7 @@ class Maps(Mapping[str, Any]):
 
     def __getitem__(self, name: str) -> Any:
         layers = self._layers[name]
-        return layers if name == "pyramid" else layers[0]
+        return layers if _INFO[name].form == "levels" else layers[0]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._layers)
@@ -126,7 +203,8 @@ class Maps(Mapping[str, Any]):
                 made += _save_npy(name, layers, target, prefix)
             else:
                 arrays = [np.require(layer, np.float32, ("C", "A")) for layer in layers]
-                made += _bumpwgpu.save_map(name, arrays, target, prefix, format, bits or 8)
+                depth = 32 if format == "exr" else bits or 8
+                made += _bumpwgpu.save_map(name, arrays, target, prefix, format, depth)
         return made
 
 
@@ -151,7 +229,7 @@ def _save_npy(name: str, layers: tuple[NDArray[np.float32], ...], folder: Path, 
     stem = f"{prefix}_{name}" if prefix else name
     made = []
     for level, layer in enumerate(layers):
-        path = folder / (f"{stem}_{level:02}.npy" if name == "pyramid" else f"{stem}.npy")
+        path = folder / (f"{stem}_{level:02}.npy" if _INFO[name].form == "levels" else f"{stem}.npy")
         data = BytesIO()
         np.save(data, layer, allow_pickle=False)
         made.append(replace_file(path, data.getvalue()))
@@ -162,8 +240,6 @@ def bake(
     source: HeightMap | HeightSource | Mesh,
     maps: str | Iterable[str] = ("normal",),
     *,
-    kernel: Kernel = "sobel3",
-    convention: Convention = "opengl",
     progress: Progress | None = None,
     **options: Any,
 ) -> Maps:
@@ -174,17 +250,14 @@ def bake(
     source : HeightMap, path, array or PIL image
         The heights.
     maps : str or iterable of str, default ("normal",)
-        Any of :data:`MAPS`: "normal", "normal_xy", "relief", "pyramid".
-    kernel : {"forward", "central", "sobel3", "sobel5", "scharr", "prewitt", "bilinear"}
-        How slopes are taken from texels; "bilinear" is the mean gradient over a texel of the very
-        surface that the searches march.
-    convention : {"opengl", "directx"}
-        Whether green points up or down the image.
+        Any of :data:`bumpwgpu.baking.MAPS`.
     progress : callable or None
         Called as ``progress(done, total)``, in rows, on the calling thread; an exception from it
         stops the bake.
     **options
-        For sources that are no HeightMap yet: what :class:`HeightMap` takes, such as ``scale``.
+        What the maps take (:func:`bumpwgpu.baking.about`), such as ``kernel`` and ``convention`` of
+        those that hold normals; each goes to every map that has it. For sources that are no HeightMap
+        yet, also what :class:`HeightMap` takes, such as ``scale``.
 
     Returns
     -------
@@ -192,10 +265,17 @@ def bake(
 
     Raises
     ------
-    ValueError, TypeError
-        An unknown map, kernel or convention, or what :class:`HeightMap` raises.
+    ValueError
+        An unknown map, an option out of range, or what :class:`HeightMap` raises.
+    TypeError
+        An option that no map has, or of the wrong type.
     FileNotFoundError, BakeError
-        The source file is missing or damaged.
+        The source file is missing or damaged; a map would not fit into memory.
+
+    Warns
+    -----
+    BumpWarning
+        An option that none of the maps asked for takes, though others do.
 
     Notes
     -----
@@ -205,33 +285,48 @@ def bake(
     Examples
     --------
     >>> import bumpwgpu as bw
-    >>> maps = bw.bake(bw.HeightMap.procedural("flat", 8), maps=("normal", "pyramid"))
+    >>> maps = bw.bake(bw.HeightMap.procedural("flat", 8), maps=("normal", "pyramid"), kernel="scharr")
     >>> maps["normal"][0, 0].tolist(), len(maps["pyramid"])
     ([0.0, 0.0, 1.0], 4)
     """
     names = _map_names(maps)
-    choice("kernel", kernel, KERNELS)
-    choice("convention", convention, CONVENTIONS)
     if progress is not None and not callable(progress):
         raise TypeError(f"progress must be callable, got {type(progress).__name__}")
     if isinstance(source, Mesh):
         raise TypeError("bake takes height maps; mesh.tangents() gives a mesh's tangent frames")
+    settings = {name: value for name, value in options.items() if name in HEIGHT_MAP_SETTINGS}
+    given = {name: value for name, value in options.items() if name not in settings}
+    _refuse_unknown(given, names)
+    values = {name: list(_INFO[name].complete(given).items()) for name in names}
     if isinstance(source, HeightMap):
-        if options:
+        if settings:
             raise TypeError(
-                f"bake() got unexpected options {', '.join(options)}; source is a HeightMap already"
+                f"bake() got {', '.join(settings)}, but source is a HeightMap already; use its replace()"
             )
         heights = source
     else:
-        heights = HeightMap(source, **options)
+        heights = HeightMap(source, **settings)
+    for name in given:
+        if not any(_INFO[wanted].option(name) for wanted in names):
+            _warn(
+                f"{name} has no effect: none of {', '.join(names)} takes it, only {', '.join(takers(name))}"
+            )
     rows = heights.shape[0]
     layers = {}
     for at, name in enumerate(names):
-        made = _bumpwgpu.bake_map(
-            heights._field, name, kernel, convention, progress, at * rows, len(names) * rows
-        )
+        made = _bumpwgpu.bake_map(heights._field, name, values[name], progress, at * rows, len(names) * rows)
         layers[name] = tuple(made)
     return Maps(layers)
+
+
+def _refuse_unknown(options: Mapping[str, Any], names: list[str]) -> None:
+    unknown = [name for name in options if name not in OPTIONS]
+    if unknown:
+        raise TypeError(f"unexpected options {', '.join(unknown)}; {', '.join(names)} takes {listing(names)}")
+    for name, value in options.items():
+        if not any(_INFO[wanted].option(name) for wanted in names):
+            # Without effect, but a mistake all the same.
+            OPTIONS[name][0].check(value)
 
 
 def _map_names(maps: Any) -> list[str]:

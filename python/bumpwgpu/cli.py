@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import sys
 import warnings
@@ -17,6 +18,8 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rich.table import Table
 
 from . import __version__, techniques
+from ._map_info import MAPS as MAP_INFO
+from ._map_info import OPTIONS, MapOption
 from .baking import MAPS
 from .baking import bake as bake_maps
 from .compare import ELEVATIONS, Scene
@@ -56,25 +59,6 @@ class WrapChoice(Enum):
     REPEAT = "repeat"
     CLAMP = "clamp"
     MIRROR = "mirror"
-
-
-class KernelChoice(Enum):
-    """Values of --kernel."""
-
-    FORWARD = "forward"
-    CENTRAL = "central"
-    SOBEL3 = "sobel3"
-    SOBEL5 = "sobel5"
-    SCHARR = "scharr"
-    PREWITT = "prewitt"
-    BILINEAR = "bilinear"
-
-
-class ConventionChoice(Enum):
-    """Values of --convention."""
-
-    OPENGL = "opengl"
-    DIRECTX = "directx"
 
 
 class FormatChoice(Enum):
@@ -254,19 +238,70 @@ def _check_suffix(path: Path, known: tuple[str, ...]) -> None:
         raise typer.BadParameter(f"{path.name!r} must end in one of {', '.join(known)}")
 
 
+def _map_option(name: str, text: str) -> Any:
+    """The value of a map's option out of the words of a command."""
+    option = OPTIONS[name][0]
+    value: Any = text
+    try:
+        if option.kind == "flag":
+            value = {"true": True, "false": False}[text.lower()]
+        elif option.kind == "whole":
+            value = int(text)
+        elif option.kind == "number":
+            value = float(text)
+    except (KeyError, ValueError):
+        expected = {"flag": "true or false", "whole": "a whole number", "number": "a number"}[option.kind]
+        raise typer.BadParameter(f"--{name.replace('_', '-')} must be {expected}, got {text!r}") from None
+    _usage(_any_takes, OPTIONS[name], value)
+    return value
+
+
+def _any_takes(options: tuple[MapOption, ...], value: Any) -> None:
+    """Raises what the last option says when none takes the value; which maps are asked for comes later."""
+    for option in options[:-1]:
+        try:
+            option.check(value)
+        except ValueError:
+            continue
+        return
+    options[-1].check(value)
+
+
+def _with_map_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Gives a command one flag for each option of the registry of maps, in place of `map_options`."""
+    # Typer does not evaluate the annotations of a signature that is given to it.
+    signature = inspect.signature(command, eval_str=True)
+    own = [part for part in signature.parameters.values() if part.kind is not inspect.Parameter.VAR_KEYWORD]
+    flags = []
+    for name, options in OPTIONS.items():
+        takers = [info.name for info in MAP_INFO.values() if info.option(name)]
+        about = typer.Option(
+            help=f"{options[0].describe()} [{', '.join(takers)}]",
+            show_default=False,
+            metavar=options[0].kind.upper(),
+            rich_help_panel="Options of maps",
+        )
+        flags.append(
+            inspect.Parameter(
+                name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[str | None, about]
+            )
+        )
+    command.__signature__ = signature.replace(parameters=[*own, *flags])  # type: ignore[attr-defined]
+    command.__annotations__ = {
+        **{name: hint for name, hint in command.__annotations__.items() if name != "map_options"},
+        **{flag.name: flag.annotation for flag in flags},
+    }
+    return command
+
+
 @app.command()
+@_with_map_options
 def bake(
     source: Annotated[Path, typer.Argument(help="Height map: PNG, TIFF, EXR, JPEG, WebP, BMP, TGA or npy.")],
     maps: Annotated[
         str, typer.Option(help=f"Maps to bake, with commas between: {', '.join(MAPS)}.")
     ] = "normal",
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the maps.")] = Path("maps"),
-    kernel: Annotated[
-        KernelChoice, typer.Option(help="How slopes are taken from texels.")
-    ] = KernelChoice.SOBEL3,
-    convention: Annotated[
-        ConventionChoice, typer.Option(help="Whether green points up or down.")
-    ] = ConventionChoice.OPENGL,
     format: Annotated[FormatChoice, typer.Option(help="File format.")] = FormatChoice.PNG,
     bits: Annotated[BitsChoice | None, typer.Option(help="Bits a channel of a PNG.")] = None,
     prefix: Annotated[str, typer.Option(help="First part of the file names.")] = "",
@@ -280,9 +315,11 @@ def bake(
     json_output: _Json = False,
     quiet: _Quiet = False,
     verbose: _Verbose = False,
+    **map_options: str | None,
 ) -> None:
-    """Make normal maps, relief maps and pyramids from a height map."""
+    """Make the maps a renderer needs from a height map."""
     wanted = _names(maps, MAPS, "map")
+    options = {name: _map_option(name, text) for name, text in map_options.items() if text is not None}
     depth: Any = int(bits.value) if bits is not None else None
     span = _range(height_range)
     with _session(json_output, quiet, verbose) as out:
@@ -297,9 +334,7 @@ def bake(
             height_range=span,
         )
         with out.progress("baking") as advance:
-            made = bake_maps(
-                heights, wanted, kernel=kernel.value, convention=convention.value, progress=advance
-            )
+            made = bake_maps(heights, wanted, progress=advance, **options)
         paths = made.save(output, format=format.value, bits=depth, prefix=prefix)
         if verbose:
             out.say(repr(heights))

@@ -23,6 +23,8 @@ Wrap: TypeAlias = Literal["repeat", "clamp", "mirror"]
 HeightSource: TypeAlias = "str | os.PathLike[str] | ArrayLike | Image.Image"
 HeightRange: TypeAlias = "Literal['auto'] | tuple[float, float] | None"
 
+#: What :class:`HeightMap` takes besides its source.
+HEIGHT_MAP_SETTINGS = ("scale", "base", "tile_size", "wrap", "channel", "invert", "height_range")
 #: Resampling filters overshoot by up to this much; such heights are clipped with a warning.
 OVERSHOOT = 0.01
 #: Channels that differ by no more than two levels of 8 bits are the same grey: palettes and lossy

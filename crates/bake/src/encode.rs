@@ -1,11 +1,13 @@
 //! Floats to the integers of image files and back.
 //!
-//! | range | to integer, `M` = 255 or 65535 | back |
+//! A channel holds numbers from `low` to `high`; with `x = (v - low) / (high - low)` and `M` = 255 or
+//! 65535 the integer `k` is
+//!
+//! | rounding | to integer | back: `low + (high - low) * k / M` |
 //! |---|---|---|
-//! | [`Range::Signed`] -1..1 | `floor(v * M/2 + M/2 + 1/2)` | `k / (M/2) - 1` |
-//! | [`Range::Unit`] 0..1 | `floor(v * M + 1/2)` | `k / M` |
-//! | [`Range::LowerBound`] 0..1 | `floor(v * M)` | `k / M`, never above `v` |
-//! | [`Range::UpperBound`] 0..1 | `ceil(v * M)` | `k / M`, never below `v` |
+//! | [`Rounding::Nearest`] | `floor(x * M + 1/2)` | within half a step of `v` |
+//! | [`Rounding::Down`] | `floor(x * M)` | never above `v` |
+//! | [`Rounding::Up`] | `ceil(x * M)` | never below `v` |
 //!
 //! Halves round up. No integer stands for 0 in the signed range (`M` is odd); rounding up makes the
 //! flat normal (128, 128, 255), or (32768, 32768, 65535), as every other tool writes it. The way
@@ -16,17 +18,37 @@ use rayon::prelude::*;
 
 use crate::Samples;
 
-/// What a channel's numbers mean, and so how they are rounded.
+/// Which way a number goes to the integer that stands for it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Range {
-    /// -1..1, a normal's component.
-    Signed,
-    /// 0..1, a height.
-    Unit,
-    /// 0..1, rounded down: a bound from below stays one.
-    LowerBound,
-    /// 0..1, rounded up: a bound from above stays one.
-    UpperBound,
+pub enum Rounding {
+    /// To the nearest one.
+    Nearest,
+    /// Down: a bound from below stays one.
+    Down,
+    /// Up: a bound from above stays one.
+    Up,
+}
+
+impl Rounding {
+    /// `"nearest"`, `"down"` or `"up"`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Rounding::Nearest => "nearest",
+            Rounding::Down => "down",
+            Rounding::Up => "up",
+        }
+    }
+}
+
+/// The numbers a channel holds, and how they are rounded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Range {
+    /// What integer 0 stands for.
+    pub low: f32,
+    /// What the largest integer stands for.
+    pub high: f32,
+    /// Which way numbers between two integers go.
+    pub rounding: Rounding,
 }
 
 /// Integer width of an encoded map.
@@ -39,28 +61,51 @@ pub enum Depth {
 }
 
 impl Range {
+    /// -1..1, a normal's component.
+    pub const SIGNED: Self = Self { low: -1.0, high: 1.0, rounding: Rounding::Nearest };
+    /// 0..1, a height.
+    pub const UNIT: Self = Self { low: 0.0, high: 1.0, rounding: Rounding::Nearest };
+    /// 0..1, rounded down.
+    pub const LOWER_BOUND: Self = Self { low: 0.0, high: 1.0, rounding: Rounding::Down };
+    /// 0..1, rounded up.
+    pub const UPPER_BOUND: Self = Self { low: 0.0, high: 1.0, rounding: Rounding::Up };
+
     /// The integer in `0..=max` that stands for `value`; see the module's table.
     #[inline]
     pub fn encode(self, value: f32, max: u16) -> u16 {
-        // f64 holds the product of a float and a 16-bit integer exactly, so bounds stay bounds.
-        let max = f64::from(max);
-        let value = f64::from(value);
-        let scaled = match self {
-            Range::Signed => value * (0.5 * max) + (0.5 * max + 0.5),
-            Range::Unit => value * max + 0.5,
-            Range::LowerBound | Range::UpperBound => value * max,
-        };
+        if self.low >= self.high {
+            return 0;
+        }
+        let wide = f64::from(max);
+        let scaled = (f64::from(value) - f64::from(self.low)) * (wide / self.width());
+        let scaled = if self.rounding == Rounding::Nearest { scaled + 0.5 } else { scaled };
         // The cast cuts the fraction off; it also sends NaN to 0.
-        let clamped = scaled.clamp(0.0, max);
-        let floor = clamped as u16;
-        if self == Range::UpperBound && f64::from(floor) < clamped { floor + 1 } else { floor }
+        let code = scaled.clamp(0.0, wide) as u16;
+        // Division and product round: bounds are held against what the integer stands for.
+        let stands_for = |code| self.decode_f64(code, wide);
+        match self.rounding {
+            Rounding::Nearest => code,
+            Rounding::Down if code > 0 && stands_for(code) > f64::from(value) => code - 1,
+            Rounding::Down if code < max && stands_for(code + 1) <= f64::from(value) => code + 1,
+            Rounding::Up if code < max && stands_for(code) < f64::from(value) => code + 1,
+            _ => code,
+        }
     }
 
     /// The value that integer `code` of `0..=max` stands for.
     #[inline]
     pub fn decode(self, code: u16, max: u16) -> f32 {
-        let unit = f64::from(code) / f64::from(max);
-        if self == Range::Signed { (2.0 * unit - 1.0) as f32 } else { unit as f32 }
+        self.decode_f64(code, f64::from(max)) as f32
+    }
+
+    #[inline]
+    fn decode_f64(self, code: u16, max: f64) -> f64 {
+        f64::from(self.low) + self.width() * (f64::from(code) / max)
+    }
+
+    #[inline]
+    fn width(self) -> f64 {
+        f64::from(self.high) - f64::from(self.low)
     }
 }
 
@@ -108,7 +153,7 @@ mod tests {
     #[test]
     fn a_flat_normal_is_128_128_255() {
         let flat = [0.0, 0.0, 1.0, -0.0, 0.0, 1.0];
-        let ranges = [Range::Signed; 3];
+        let ranges = [Range::SIGNED; 3];
         assert_eq!(encode(&flat, &ranges, Depth::U8), Samples::U8(vec![128, 128, 255, 128, 128, 255]));
         let wide = vec![32768, 32768, 65535, 32768, 32768, 65535];
         assert_eq!(encode(&flat, &ranges, Depth::U16), Samples::U16(wide));
@@ -117,8 +162,8 @@ mod tests {
     #[test]
     fn ends_and_nonsense_are_clamped() {
         for max in [255, u16::MAX] {
-            for range in [Range::Signed, Range::Unit, Range::LowerBound, Range::UpperBound] {
-                let low = if range == Range::Signed { -1.0 } else { 0.0 };
+            for range in [Range::SIGNED, Range::UNIT, Range::LOWER_BOUND, Range::UPPER_BOUND] {
+                let low = if range == Range::SIGNED { -1.0 } else { 0.0 };
                 assert_eq!(range.encode(low, max), 0, "{range:?}");
                 assert_eq!(range.encode(1.0, max), max, "{range:?}");
                 assert_eq!(range.encode(f32::INFINITY, max), max);
@@ -130,7 +175,7 @@ mod tests {
 
     #[test]
     fn every_code_round_trips() {
-        for range in [Range::Signed, Range::Unit] {
+        for range in [Range::SIGNED, Range::UNIT] {
             for code in 0..=u16::MAX {
                 assert_eq!(range.encode(range.decode(code, u16::MAX), u16::MAX), code);
             }
@@ -147,15 +192,46 @@ mod tests {
             let step = 1.0 / f64::from(max);
             let exact = |code: u16| f64::from(code) / f64::from(max);
             let value64 = f64::from(value);
-            let low = exact(Range::LowerBound.encode(value, max));
-            let high = exact(Range::UpperBound.encode(value, max));
+            let low = exact(Range::LOWER_BOUND.encode(value, max));
+            let high = exact(Range::UPPER_BOUND.encode(value, max));
             prop_assert!(low <= value64 && value64 - low < step);
             prop_assert!(high >= value64 && high - value64 < step);
-            let near = exact(Range::Unit.encode(value, max));
+            let near = exact(Range::UNIT.encode(value, max));
             prop_assert!((near - value64).abs() <= 0.5 * step + 1e-12);
             let signed = 2.0 * value - 1.0;
-            let back = f64::from(Range::Signed.decode(Range::Signed.encode(signed, max), max));
+            let back = f64::from(Range::SIGNED.decode(Range::SIGNED.encode(signed, max), max));
             prop_assert!((back - f64::from(signed)).abs() <= step + 1e-6);
+        }
+
+        #[test]
+        fn bounds_hold_in_any_range(
+            low in -1e3_f32..1e3,
+            width in 1e-3_f32..1e3,
+            at in 0.0_f32..=1.0,
+            wide: bool,
+        ) {
+            let max = if wide { u16::MAX } else { 255 };
+            let high = low + width;
+            prop_assume!(high > low);
+            let value = (low + at * width).clamp(low, high);
+            let step = f64::from(high - low) / f64::from(max) * (1.0 + 1e-6) + 1e-4;
+            let back = |rounding| {
+                let range = Range { low, high, rounding };
+                range.decode(range.encode(value, max), max)
+            };
+            let (down, up, near) = (back(Rounding::Down), back(Rounding::Up), back(Rounding::Nearest));
+            prop_assert!(down <= value && f64::from(value - down) <= step);
+            prop_assert!(up >= value && f64::from(up - value) <= step);
+            prop_assert!(f64::from((near - value).abs()) <= 0.5 * step);
+        }
+    }
+
+    #[test]
+    fn an_empty_range_is_its_one_number() {
+        for rounding in [Rounding::Nearest, Rounding::Down, Rounding::Up] {
+            let range = Range { low: 3.5, high: 3.5, rounding };
+            assert_eq!(range.encode(3.5, 255), 0, "{rounding:?}");
+            assert_eq!(range.decode(0, 255), 3.5);
         }
     }
 }

@@ -97,6 +97,26 @@ pub enum BakeError {
         /// All names, comma separated.
         known: String,
     },
+    /// A map does not take that option, or the option not that value.
+    #[error("map {map:?}, option {option:?}: {problem}")]
+    Option {
+        /// Name of the map.
+        map: &'static str,
+        /// Name of the option.
+        option: String,
+        /// What is wrong, and what is taken.
+        problem: String,
+    },
+    /// A map would not fit into memory; nothing was allocated.
+    #[error("{what} needs {bytes} bytes; {available} bytes of memory are available")]
+    Memory {
+        /// Which map, and its size.
+        what: String,
+        /// Bytes needed.
+        bytes: u128,
+        /// Bytes that can be had.
+        available: u128,
+    },
     /// The height field or its extent makes no sense.
     #[error(transparent)]
     HeightField(#[from] HeightFieldError),

@@ -65,6 +65,10 @@ impl Kernel {
         Kernel::Bilinear,
     ];
 
+    /// The names of all kernels.
+    pub const NAMES: &'static [&'static str] =
+        &["forward", "central", "sobel3", "sobel5", "scharr", "prewitt", "bilinear"];
+
     /// The kernel's name, lower case.
     pub fn name(self) -> &'static str {
         match self {
@@ -127,6 +131,7 @@ mod tests {
 
     #[test]
     fn names_round_trip() {
+        assert_eq!(Kernel::ALL.map(Kernel::name), Kernel::NAMES);
         for kernel in Kernel::ALL {
             assert_eq!(Kernel::named(kernel.name()).unwrap(), kernel);
         }

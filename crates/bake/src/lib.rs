@@ -1,8 +1,8 @@
 //! Maps from height fields, and the image files they come from and go to.
 //!
 //! Data flows one way: [`files`] -> `heightfield::HeightField` -> [`mod@slopes`] -> the maps
-//! ([`normal`], [`relief`], [`mod@pyramid`]) -> [`encode`] -> [`files`]. [`maps`] lists all maps by name
-//! and drives them; a new map is one file here and one entry there.
+//! ([`normal`], [`relief`], [`mod@pyramid`]) -> [`encode`] -> [`files`]. [`maps`] is the registry of all
+//! maps and drives them; a new map is one file here and one line there.
 //!
 //! Conventions: row 0 is the top, `u` runs right and `v` down. Baked maps are `f32`: normals in
 //! -1..1 with +X right, +Y up, +Z out (OpenGL, glTF), heights in 0..1. Integers appear only when a
@@ -15,6 +15,7 @@ pub mod files;
 pub mod image;
 pub mod kernel;
 pub mod maps;
+mod memory;
 pub mod normal;
 pub mod progress;
 pub mod pyramid;
@@ -27,7 +28,10 @@ pub use error::BakeError;
 pub use files::{WriteOptions, decode_image, read_image, write_image, write_image_with};
 pub use image::{Image, Samples};
 pub use kernel::Kernel;
-pub use maps::{BakeOptions, Baked, FileFormat, Layer, Map, bake, save};
+pub use maps::{
+    Baked, Channel, FileFormat, Form, Grid, Kind, Layer, Map, MapInfo, MapOption, Options, Plan, Span, Value,
+    bake, save,
+};
 pub use normal::{Convention, normal_map, normal_xy};
 pub use progress::Progress;
 pub use pyramid::{Level, pyramid};

@@ -8,8 +8,10 @@
 //! because `y = -v`. The DirectX convention stores `-y` in green. Source: Blinn 1978, "Simulation
 //! of wrinkled surfaces"; Cohen, Olano, Manocha 1998 for normals kept in a map.
 
-use heightfield::{Extent, HeightField};
+use heightfield::HeightField;
 
+use crate::encode::Range;
+use crate::maps::{Channel, Form, Kind, Layer, Map, MapInfo, MapOption, Options, Plan};
 use crate::rows::{Row, for_each_row};
 use crate::{BakeError, Kernel, Progress};
 
@@ -28,6 +30,9 @@ pub enum Convention {
 }
 
 impl Convention {
+    /// The names of both.
+    pub const NAMES: &'static [&'static str] = &["opengl", "directx"];
+
     /// The convention's name: `"opengl"` or `"directx"`.
     pub fn name(self) -> &'static str {
         match self {
@@ -47,9 +52,73 @@ impl Convention {
             .ok_or_else(|| BakeError::UnknownName {
                 what: "convention",
                 name: name.to_owned(),
-                known: "opengl, directx".to_owned(),
+                known: Self::NAMES.join(", "),
             })
     }
+}
+
+/// Options of every map that holds normals.
+pub(crate) const OPTIONS: &[MapOption] = &[
+    MapOption {
+        name: "kernel",
+        summary: "how slopes are taken from texels",
+        kind: Kind::Choice { default: "sobel3", choices: Kernel::NAMES },
+    },
+    MapOption {
+        name: "convention",
+        summary: "whether green points up (opengl) or down the image",
+        kind: Kind::Choice { default: "opengl", choices: Convention::NAMES },
+    },
+];
+
+/// Normal x, y, z.
+pub static NORMAL: Map = Map {
+    info: MapInfo {
+        name: "normal",
+        summary: "unit normal x, y, z in -1..1",
+        source: "Blinn 1978; Cohen, Olano, Manocha 1998",
+        version: 1,
+        costly: false,
+        form: Form::Single,
+        channels: &[
+            Channel::fixed("x", Range::SIGNED),
+            Channel::fixed("y", Range::SIGNED),
+            Channel::fixed("z", Range::SIGNED),
+        ],
+        options: OPTIONS,
+    },
+    plan: |grid, _| Plan::single(grid),
+    bake: |field, options, progress| {
+        let (kernel, convention) = settings(options)?;
+        single(field, normal_map(field, kernel, convention, progress)?)
+    },
+};
+
+/// Normal x, y.
+pub static NORMAL_XY: Map = Map {
+    info: MapInfo {
+        name: "normal_xy",
+        summary: "unit normal x, y in -1..1; z = sqrt(1 - x^2 - y^2)",
+        source: "Blinn 1978; Cohen, Olano, Manocha 1998",
+        version: 1,
+        costly: false,
+        form: Form::Single,
+        channels: &[Channel::fixed("x", Range::SIGNED), Channel::fixed("y", Range::SIGNED)],
+        options: OPTIONS,
+    },
+    plan: |grid, _| Plan::single(grid),
+    bake: |field, options, progress| {
+        let (kernel, convention) = settings(options)?;
+        single(field, normal_xy(field, kernel, convention, progress)?)
+    },
+};
+
+pub(crate) fn settings(options: &Options) -> Result<(Kernel, Convention), BakeError> {
+    Ok((Kernel::named(options.choice("kernel"))?, Convention::named(options.choice("convention"))?))
+}
+
+pub(crate) fn single(field: &HeightField, texels: Vec<f32>) -> Result<Vec<Layer>, BakeError> {
+    Ok(vec![Layer::flat(field.width(), field.height(), texels)])
 }
 
 /// Factors that turn height per texel into normal x and y before normalisation.
@@ -60,20 +129,16 @@ pub(crate) struct Factors {
 }
 
 impl Factors {
-    pub(crate) fn new(
-        field: &HeightField,
-        extent: &Extent,
-        convention: Convention,
-    ) -> Result<Self, BakeError> {
-        extent.validate()?;
+    pub(crate) fn new(field: &HeightField, convention: Convention) -> Self {
+        let extent = field.extent();
         let factor = |texels: usize, tile: f32| {
             (f64::from(extent.scale) * texels as f64 / f64::from(tile)).min(STEEPEST) as f32
         };
         let y = factor(field.height(), extent.tile_size[1]);
-        Ok(Self {
+        Self {
             x: -factor(field.width(), extent.tile_size[0]),
             y: if convention == Convention::OpenGl { y } else { -y },
-        })
+        }
     }
 
     /// Normal components of a row.
@@ -92,18 +157,17 @@ impl Factors {
     }
 }
 
-/// The normal map, `height * width * 3` floats in -1..1, z above 0.
+/// The normal map in the field's extent, `height * width * 3` floats in -1..1, z above 0.
 ///
 /// # Errors
-/// [`BakeError::HeightField`] for a senseless extent, [`BakeError::Interrupted`].
+/// [`BakeError::Interrupted`].
 pub fn normal_map(
     field: &HeightField,
-    extent: &Extent,
     kernel: Kernel,
     convention: Convention,
     mut progress: Progress<'_>,
 ) -> Result<Vec<f32>, BakeError> {
-    let factors = Factors::new(field, extent, convention)?;
+    let factors = Factors::new(field, convention);
     let mut map = vec![0.0; field.width() * field.height() * 3];
     for_each_row(field, kernel, &mut map, &mut progress, |row, out, normal| {
         factors.normals(row, normal);
@@ -123,12 +187,11 @@ pub fn normal_map(
 /// See [`normal_map`].
 pub fn normal_xy(
     field: &HeightField,
-    extent: &Extent,
     kernel: Kernel,
     convention: Convention,
     mut progress: Progress<'_>,
 ) -> Result<Vec<f32>, BakeError> {
-    let factors = Factors::new(field, extent, convention)?;
+    let factors = Factors::new(field, convention);
     let mut map = vec![0.0; field.width() * field.height() * 2];
     for_each_row(field, kernel, &mut map, &mut progress, |row, out, normal| {
         factors.normals(row, normal);

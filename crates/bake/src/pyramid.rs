@@ -10,7 +10,28 @@
 use heightfield::HeightField;
 use rayon::prelude::*;
 
+use crate::encode::Range;
+use crate::maps::{Channel, Form, Layer, Map, MapInfo, Plan};
 use crate::{BakeError, Progress};
+
+/// Lowest and highest point of blocks, in levels.
+pub static PYRAMID: Map = Map {
+    info: MapInfo {
+        name: "pyramid",
+        summary: "lowest and highest height of ever larger blocks, in levels",
+        source: "Tevs, Ihrke, Seidel 2008",
+        version: 1,
+        costly: false,
+        form: Form::Levels,
+        channels: &[Channel::fixed("low", Range::LOWER_BOUND), Channel::fixed("high", Range::UPPER_BOUND)],
+        options: &[],
+    },
+    plan: |grid, _| Plan::levels(grid.cells()),
+    bake: |field, _, progress| {
+        let layer = |level: Level| Layer::flat(level.width, level.height, level.min_max);
+        Ok(pyramid(field, progress)?.into_iter().map(layer).collect())
+    },
+};
 
 /// One level of a pyramid.
 #[derive(Debug, Clone, PartialEq)]

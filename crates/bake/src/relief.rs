@@ -4,24 +4,49 @@
 //! "Real-time relief mapping on arbitrary polygonal surfaces". Alpha is the height itself (1 high),
 //! not the depth of that paper.
 
-use heightfield::{Extent, HeightField};
+use heightfield::HeightField;
 
-use crate::normal::Factors;
+use crate::encode::Range;
+use crate::maps::{Channel, Form, Map, MapInfo, Plan};
+use crate::normal::{Factors, OPTIONS, settings, single};
 use crate::rows::for_each_row;
 use crate::{BakeError, Convention, Kernel, Progress};
+
+/// Normal x, y, z and height.
+pub static RELIEF: Map = Map {
+    info: MapInfo {
+        name: "relief",
+        summary: "unit normal x, y, z in -1..1 and height in 0..1",
+        source: "Policarpo, Oliveira, Comba 2005",
+        version: 1,
+        costly: false,
+        form: Form::Single,
+        channels: &[
+            Channel::fixed("x", Range::SIGNED),
+            Channel::fixed("y", Range::SIGNED),
+            Channel::fixed("z", Range::SIGNED),
+            Channel::fixed("height", Range::UNIT),
+        ],
+        options: OPTIONS,
+    },
+    plan: |grid, _| Plan::single(grid),
+    bake: |field, options, progress| {
+        let (kernel, convention) = settings(options)?;
+        single(field, relief_map(field, kernel, convention, progress)?)
+    },
+};
 
 /// The relief map, `height * width * 4` floats: normal x, y, z in -1..1, height in 0..1.
 ///
 /// # Errors
-/// [`BakeError::HeightField`] for a senseless extent, [`BakeError::Interrupted`].
+/// [`BakeError::Interrupted`].
 pub fn relief_map(
     field: &HeightField,
-    extent: &Extent,
     kernel: Kernel,
     convention: Convention,
     mut progress: Progress<'_>,
 ) -> Result<Vec<f32>, BakeError> {
-    let factors = Factors::new(field, extent, convention)?;
+    let factors = Factors::new(field, convention);
     let mut map = vec![0.0; field.width() * field.height() * 4];
     for_each_row(field, kernel, &mut map, &mut progress, |row, out, normal| {
         factors.normals(row, normal);

@@ -159,7 +159,8 @@ fn bakes_come_as_close_to_shipped_normal_maps_as_they_can() {
         };
         let mean_error = |texels: &[f32], convention, extent: &Extent| {
             let field = HeightField::new(texels, w, h, Wrap::Repeat).unwrap();
-            let map = normal_map(&field, extent, Kernel::Sobel3, convention, Progress::none()).unwrap();
+            let field = field.with_extent(*extent).unwrap();
+            let map = normal_map(&field, Kernel::Sobel3, convention, Progress::none()).unwrap();
             let error = |(found, &shipped): (&[f32], &[f64; 3])| {
                 angle([found[0], found[1], found[2]].map(f64::from), shipped)
             };

@@ -78,7 +78,7 @@ impl Raise for BakeError {
                 io(source.kind(), message.clone()).unwrap_or_else(|| PyBakeError::new_err(message))
             }
             Self::HeightField(error) => error.raise(),
-            Self::UnknownName { .. } | Self::Shape { .. } => PyValueError::new_err(message),
+            Self::UnknownName { .. } | Self::Shape { .. } | Self::Option { .. } => PyValueError::new_err(message),
             _ => PyBakeError::new_err(message),
         }
     }

@@ -41,7 +41,8 @@ impl Field {
     }
 }
 
-fn parse_wrap(wrap: &str) -> PyResult<Wrap> {
+/// The wrap mode of that name.
+pub fn parse_wrap(wrap: &str) -> PyResult<Wrap> {
     match wrap {
         "repeat" => Ok(Wrap::Repeat),
         "clamp" => Ok(Wrap::Clamp),

@@ -1,6 +1,7 @@
 //! Limits on what a file may ask for.
 
 use crate::BakeError;
+use crate::memory::available_memory;
 
 /// Most samples an image may have.
 const MAX_SAMPLES: u128 = 1 << 31;
@@ -73,14 +74,6 @@ impl Claim {
         buffer.resize(samples, T::default());
         Ok(buffer)
     }
-}
-
-/// Bytes that can be had without swapping, where the system tells.
-fn available_memory() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
-    let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kilobytes << 10)
 }
 
 #[cfg(test)]

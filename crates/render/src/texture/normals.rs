@@ -58,8 +58,7 @@ pub(crate) fn own_8_bit(image: &Image) -> Vec<MipLevel> {
 
 /// All levels of a normal map baked from heights, 8 bits.
 pub(crate) fn baked_8_bit(field: &HeightField) -> Result<Vec<MipLevel>, RenderError> {
-    let normals =
-        bake::normal_map(field, field.extent(), Kernel::Central, Convention::OpenGl, Progress::none())?;
+    let normals = bake::normal_map(field, Kernel::Central, Convention::OpenGl, Progress::none())?;
     let normals = normals.chunks_exact(3).map(Vec3::from_slice).collect();
     Ok(chain([field.width(), field.height()], normals, eight_bits))
 }
