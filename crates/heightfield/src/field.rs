@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use crate::{HeightFieldError, MaxPyramid};
+use crate::{HeightFieldError, MaxPyramid, SkipPyramid};
 
 /// Longest accepted side, in texels. Cell ids and their sums stay exact in `f32` up to here.
 pub const MAX_SIDE: usize = 1 << 16;
@@ -102,6 +102,7 @@ pub struct HeightField {
     cells: [usize; 2],
     extent: Extent,
     pyramid: OnceLock<MaxPyramid>,
+    skip_pyramid: OnceLock<SkipPyramid>,
 }
 
 impl HeightField {
@@ -135,7 +136,16 @@ impl HeightField {
             let row = wrap.index(j + first, height) * width;
             corners.extend((0..=cells[0] as i64).map(|i| texels[row + wrap.index(i + first, width)]));
         }
-        Ok(Self { width, height, wrap, corners, cells, extent: Extent::default(), pyramid: OnceLock::new() })
+        Ok(Self {
+            width,
+            height,
+            wrap,
+            corners,
+            cells,
+            extent: Extent::default(),
+            pyramid: OnceLock::new(),
+            skip_pyramid: OnceLock::new(),
+        })
     }
 
     /// The same field with another size in mesh units.
@@ -302,5 +312,10 @@ impl HeightField {
     /// The max pyramid over the cells, built when first asked for.
     pub fn pyramid(&self) -> &MaxPyramid {
         self.pyramid.get_or_init(|| MaxPyramid::build(self))
+    }
+
+    /// The max pyramid with a margin around its nodes, built when first asked for.
+    pub fn skip_pyramid(&self) -> &SkipPyramid {
+        self.skip_pyramid.get_or_init(|| SkipPyramid::build(self))
     }
 }

@@ -15,6 +15,7 @@ pub mod pyramid;
 pub mod ray;
 pub mod rays;
 pub mod search;
+pub mod skip_pyramid;
 pub mod technique;
 
 pub use error::HeightFieldError;
@@ -24,4 +25,5 @@ pub use march::{MarchOptions, march, march_into};
 pub use pyramid::MaxPyramid;
 pub use ray::{Found, Segment, Status};
 pub use rays::RayArray;
+pub use skip_pyramid::SkipPyramid;
 pub use technique::{Parameter, Technique, TechniqueInfo};
