@@ -93,11 +93,8 @@ pub fn judge(surface: &Surface, kind: Kind, (origin, direction): Ray, answer: An
     let error = ((t - seen.touch).abs() - rounding).max(0.0) * dz;
     let verdict = if !near {
         Verdict::False
-    } else if error <= DEPTH || (t < seen.touch && gap <= slack + rounding * speed) {
-        // Either the touch itself or, before it, a place it comes as close to.
-        Verdict::Right
-    } else if t <= seen.deep {
-        // Between touch and depth: inside a graze.
+    } else if error <= DEPTH || gap <= slack + rounding * speed {
+        // The touch itself, or another place the ray comes as close to before it goes in.
         Verdict::Right
     } else {
         Verdict::Inaccurate
