@@ -52,8 +52,14 @@ wheel: setup ## one abi3 wheel and a source distribution in dist/
 	.venv/bin/maturin build --release --out dist
 	.venv/bin/maturin sdist --out dist
 
-bench: setup ## time and error of every search, side by side
-	cargo bench --locked -p heightfield
+# criterion would refuse a baseline that lacks a search, which a new one always does: hence lenient.
+bench: setup ## time, error and instructions of every search in one table; QUICK=1 SAVE=name BASELINE=name
+	@cargo bench --locked -p compare --bench search --no-run
+	@echo "About ten minutes, two with QUICK=1. criterion's own report goes to target/bench.log."
+	@BENCH_QUICK=$(QUICK) cargo bench --locked -p compare --bench search -- --quiet \
+	    $(if $(BASELINE),--baseline-lenient $(BASELINE),$(if $(SAVE),--save-baseline $(SAVE))) \
+	    >target/bench.log 2>&1 || { tail -20 target/bench.log >&2; exit 1; }
+	@sed -n '/^Searches: /,$$p' target/bench.log
 
 lint: extension ## formatting, clippy, ruff, mypy, stubtest
 	cargo fmt --all --check
