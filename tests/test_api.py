@@ -32,7 +32,8 @@ GPU = doctest.register_optionflag("GPU")
 SIGNATURES = {
     "HeightMap": "source * scale base tile_size wrap channel invert height_range",
     "HeightMap.procedural": "name size seed * scale base tile_size wrap",
-    "march": "height_map origins directions technique * device outputs from_surface",
+    "march": "height_map origins directions technique * device outputs from_surface out progress",
+    "march_stream": "height_map chunks technique * outputs from_surface overlap",
     "bake": "source maps * progress **options",
     "Maps.save": "self folder * format bits prefix",
     "Mesh": "positions indices uvs * normals tangents",

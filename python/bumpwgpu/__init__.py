@@ -20,6 +20,7 @@ from .marching import Hits, march
 from .meshes import Mesh, MeshMaterial, Part, Tangents
 from .rendering import Frame, render
 from .scene import Camera, Light, Material
+from .streaming import march_stream
 from .system import info
 
 if "XDG_RUNTIME_DIR" not in _os.environ:
@@ -52,6 +53,7 @@ __all__ = [
     "compare",
     "info",
     "march",
+    "march_stream",
     "render",
     "techniques",
 ]

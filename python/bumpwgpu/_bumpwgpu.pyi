@@ -22,6 +22,7 @@ __all__ = [
     "VERSION",
     "BakeError",
     "BumpError",
+    "Cancel",
     "CompareError",
     "CompareView",
     "Field",
@@ -86,6 +87,11 @@ class _MaterialEntry(TypedDict):
     bump_scale: float
     displacement_scale: float
     normal_scale: float
+
+@final
+class Cancel:
+    def __new__(cls) -> Cancel: ...
+    def set(self) -> None: ...
 
 @final
 class Field:
@@ -213,9 +219,11 @@ def march(
     directions: NDArray[Any],
     technique: str,
     parameters: _Parameters,
-    outputs: Sequence[str],
+    out: dict[str, NDArray[Any]],
     from_surface: bool,
-) -> dict[str, NDArray[Any]]: ...
+    first: int = 0,
+    cancel: Cancel | None = None,
+) -> None: ...
 def march_gpu(
     field: Field,
     origins: NDArray[np.float32],

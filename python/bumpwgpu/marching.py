@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from typing import Any, Literal, TypeAlias
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _bumpwgpu
+from ._blocks import BLOCK, Window, blocks
 from ._checks import choice, flag, rows, strings
 from .heightmap import HeightMap
 from .techniques import Technique, get, marching
@@ -20,6 +21,16 @@ Device: TypeAlias = Literal["cpu", "gpu", "auto"]
 
 #: Everything `march` can return.
 OUTPUTS = ("t", "uv", "z", "normal", "steps", "status")
+
+# Numbers a ray and their type, of each output.
+_SHAPES: dict[str, tuple[tuple[int, ...], type[np.generic]]] = {
+    "t": ((), np.float32),
+    "uv": ((2,), np.float32),
+    "z": ((), np.float32),
+    "normal": ((3,), np.float32),
+    "steps": ((), np.uint32),
+    "status": ((), np.uint8),
+}
 
 
 class Hits:
@@ -113,6 +124,8 @@ def march(
     device: Device = "cpu",
     outputs: Iterable[str] = OUTPUTS,
     from_surface: bool = False,
+    out: Mapping[str, NDArray[Any]] | None = None,
+    progress: Callable[[int, int], object] | None = None,
 ) -> Hits:
     """Find where rays first meet a height map.
 
@@ -133,16 +146,23 @@ def march(
         Any of "t", "uv", "z", "normal", "steps", "status"; fewer are faster.
     from_surface : bool, default False
         The origins lie on the surface: the march leaves it first (shadow rays).
+    out : mapping of str to ndarray, optional
+        Arrays of yours that the results go to, by output name: C-contiguous, of the type and shape
+        given in :class:`Hits`. Unless you say otherwise, `outputs` are those that it has. After an
+        error they hold anything.
+    progress : callable, optional
+        Called as ``progress(rays done, all rays)`` after each million rays on the CPU, and at the end.
 
     Returns
     -------
     Hits
+        With `out`, its arrays are those.
 
     Raises
     ------
     ValueError
         Wrong shapes, no rays, an infinite, NaN or zero direction (the message names the ray), an
-        unknown technique or output.
+        unknown technique or output, an array in `out` that does not fit or overlaps another.
     TypeError
         Arguments of the wrong type.
     RenderError
@@ -152,6 +172,11 @@ def march(
     -----
     ``"exact"`` solves each bilinear cell in closed form (Musgrave 1988) and skips with a max pyramid
     (Tevs, Ihrke, Seidel 2008). A ray that starts below the surface hits at t = 0.
+
+    More rays than memory holds: give memory-mapped arrays, as ``numpy.load(path, mmap_mode="r")`` and
+    ``numpy.lib.format.open_memmap`` make them, for rays and `out`. A million rays are in memory at a
+    time; arrays that need a conversion are converted in such blocks too. For rays that are made as they
+    are marched there is :func:`march_stream`.
 
     Examples
     --------
@@ -163,17 +188,18 @@ def march(
     """
     if not isinstance(height_map, HeightMap):
         raise TypeError(f"height_map must be a HeightMap, got {type(height_map).__name__}")
-    chosen = get(technique)
-    if not chosen.marches:
-        raise ValueError(f"technique {chosen.name!r} does not march; these do: {', '.join(marching())}")
-    wanted = strings("outputs", outputs, OUTPUTS)
-    if not wanted:
-        raise ValueError(f"outputs is empty; ask for at least one of {', '.join(OUTPUTS)}")
+    chosen = _searching(technique)
+    if out is not None and outputs is OUTPUTS:
+        outputs = _names(out)
+    wanted = wanted_outputs(outputs)
     from_surface = flag("from_surface", from_surface)
     starts, ways = _rays("origins", origins), _rays("directions", directions)
     choice("device", device, ("cpu", "gpu", "auto"))
+    if progress is not None and not callable(progress):
+        raise TypeError(f"progress must be callable, got {type(progress).__name__}")
+    places = None if out is None else _places(out, wanted, starts, ways)
     if device == "auto":
-        on_device = not from_surface and starts.dtype == ways.dtype == np.float32 and _has_hardware()
+        on_device = not from_surface and _dtype(starts) == _dtype(ways) == np.float32 and _has_hardware()
     else:
         on_device = device == "gpu"
     parameters = list(chosen.parameters.items())
@@ -188,9 +214,55 @@ def march(
             parameters,
             wanted,
         )
+        if places is not None:
+            for name, place in places.items():
+                np.copyto(place, arrays[name])
+            arrays = places
         return Hits(arrays, seconds)
-    arrays = _bumpwgpu.march(height_map._field, starts, ways, chosen.name, parameters, wanted, from_surface)
-    return Hits(arrays)
+    if places is None:
+        places = empty_places(wanted, len(starts))
+    _march_in_blocks(height_map, starts, ways, (chosen.name, parameters), places, from_surface, progress)
+    return Hits(places)
+
+
+def _march_in_blocks(
+    height_map: HeightMap,
+    starts: NDArray[Any],
+    ways: NDArray[Any],
+    technique: tuple[str, Sequence[tuple[str, float]]],
+    places: dict[str, NDArray[Any]],
+    from_surface: bool,
+    progress: Callable[[int, int], object] | None,
+) -> None:
+    """One call where all lies in memory as it is needed; else a block of rays after the other."""
+    name, parameters = technique
+    total = len(starts)
+    windows = [Window(array) for array in (starts, ways, *places.values())]
+    usable = _usable(starts) and _usable(ways)
+    if total <= BLOCK or (usable and progress is None and not any(window.mapped for window in windows)):
+        _bumpwgpu.march(
+            height_map._field, _ready(starts), _ready(ways), name, parameters, places, from_surface
+        )
+        if progress is not None:
+            progress(total, total)
+        return
+    for first, last in blocks(total):
+        for window in windows[:2]:
+            window.read_ahead(last, last + BLOCK)
+        _bumpwgpu.march(
+            height_map._field,
+            _ready(starts[first:last]),
+            _ready(ways[first:last]),
+            name,
+            parameters,
+            {output: place[first:last] for output, place in places.items()},
+            from_surface,
+            first,
+        )
+        for window in windows:
+            window.let_go(first, last)
+        if progress is not None:
+            progress(last, total)
 
 
 @cache
@@ -198,10 +270,79 @@ def _has_hardware() -> bool:
     return any(kind in ("discrete", "integrated") for *_, kind in _bumpwgpu.adapters())
 
 
+def _searching(technique: str | Technique) -> Technique:
+    chosen = get(technique)
+    if not chosen.marches:
+        raise ValueError(f"technique {chosen.name!r} does not march; these do: {', '.join(marching())}")
+    return chosen
+
+
+def wanted_outputs(outputs: Iterable[str]) -> list[str]:
+    """The outputs by name, at least one."""
+    wanted = strings("outputs", outputs, OUTPUTS)
+    if not wanted:
+        raise ValueError(f"outputs is empty; ask for at least one of {', '.join(OUTPUTS)}")
+    return wanted
+
+
+def empty_places(wanted: Iterable[str], count: int) -> dict[str, NDArray[Any]]:
+    """Arrays for the results of so many rays, in the order of `OUTPUTS`."""
+    shapes = {name: _SHAPES[name] for name in OUTPUTS if name in wanted}
+    return {name: np.empty((count, *shape), dtype) for name, (shape, dtype) in shapes.items()}
+
+
+def _names(out: Mapping[str, NDArray[Any]]) -> list[str]:
+    if not isinstance(out, Mapping):
+        raise TypeError(f"out must map output names to arrays, got {type(out).__name__}")
+    names = strings("out", out, OUTPUTS)
+    if not names:
+        raise ValueError(f"out is empty; give an array for at least one of {', '.join(OUTPUTS)}")
+    return names
+
+
+def _places(
+    out: Mapping[str, NDArray[Any]], wanted: list[str], starts: NDArray[Any], ways: NDArray[Any]
+) -> dict[str, NDArray[Any]]:
+    """The arrays of `out`, checked: what is written to them must not change what is read."""
+    names = _names(out)
+    if set(names) != set(wanted):
+        raise ValueError(f"out has {', '.join(names)} but outputs are {', '.join(wanted)}")
+    others = {"origins": starts, "directions": ways}
+    places: dict[str, NDArray[Any]] = {}
+    for name in (name for name in OUTPUTS if name in names):
+        place, (shape, dtype) = out[name], _SHAPES[name]
+        if not isinstance(place, np.ndarray):
+            raise TypeError(f"out[{name!r}] must be an array, got {type(place).__name__}")
+        expected = (len(starts), *shape)
+        if place.shape != expected or place.dtype != dtype:
+            need = f"{np.dtype(dtype)} of shape {expected}"
+            raise ValueError(f"out[{name!r}] must be {need}, got {place.dtype} of shape {place.shape}")
+        if not (place.flags.c_contiguous and place.flags.aligned and place.flags.writeable):
+            raise ValueError(f"out[{name!r}] must be C-contiguous, aligned and writable")
+        for other, array in (*others.items(), *((f"out[{n!r}]", a) for n, a in places.items())):
+            if np.may_share_memory(place, array):
+                raise ValueError(f"out[{name!r}] overlaps {other}")
+        places[name] = place.view(np.ndarray)
+    return places
+
+
 def _rays(name: str, values: Any) -> NDArray[Any]:
-    """(N, 3) float32 or float64, C-contiguous, aligned, native: copied only when it is not."""
+    """(N, 3) numbers, where and as they lie."""
     array = rows(name, values, 3)
     if array.shape[0] == 0:
         raise ValueError(f"{name} is empty: there are no rays to march")
-    dtype = np.float32 if array.dtype == np.float32 else np.float64
-    return np.require(array, dtype=dtype, requirements=("C", "A"))
+    return array
+
+
+def _dtype(rays: NDArray[Any]) -> type[np.generic]:
+    return np.float32 if rays.dtype == np.float32 else np.float64
+
+
+def _usable(rays: NDArray[Any]) -> bool:
+    """Whether the core can read the rays where they lie."""
+    return bool(rays.dtype == _dtype(rays) and rays.flags.c_contiguous and rays.flags.aligned)
+
+
+def _ready(rays: NDArray[Any]) -> NDArray[Any]:
+    """float32 or float64, C-contiguous, aligned, native: copied only when it is not."""
+    return np.require(rays, dtype=_dtype(rays), requirements=("C", "A"))

@@ -30,7 +30,7 @@ mod _bumpwgpu {
     #[pymodule_export]
     use crate::images::{decode_image, effective_bits, read_image};
     #[pymodule_export]
-    use crate::march::{march, techniques};
+    use crate::march::{Cancel, march, techniques};
     #[pymodule_export]
     use crate::mesh::{PyMesh, tangent_methods};
     #[pymodule_export]

@@ -1,7 +1,13 @@
 //! Marching batches of rays, and the registry of techniques.
 
-use heightfield::{Hits, MarchOptions, OutputSet, RayArray, Technique};
-use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use heightfield::{HeightFieldError, Hits, HitsMut, MarchOptions, OutputSet, RayArray, Technique};
+use numpy::ndarray::Dimension;
+use numpy::{
+    Element, PyArray, PyArray1, PyArrayMethods, PyReadonlyArray2, PyReadwriteArray, PyReadwriteArray1,
+    PyReadwriteArray2, PyUntypedArrayMethods,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -108,8 +114,94 @@ pub fn hits_to_dict(py: Python<'_>, hits: Hits) -> PyResult<Bound<'_, PyDict>> {
     Ok(dict)
 }
 
-/// Marches on the CPU.
+/// Set from one Python thread to stop a march that another one waits for.
+#[pyclass(frozen, module = "bumpwgpu._bumpwgpu")]
+#[derive(Default)]
+pub struct Cancel {
+    flag: AtomicBool,
+}
+
+#[pymethods]
+impl Cancel {
+    #[new]
+    fn new() -> Self {
+        Self::default()
+    }
+
+    /// Asks the march to stop.
+    fn set(&self) {
+        self.flag.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Arrays of the caller's that the results go to.
+struct Places<'py> {
+    t: Option<PyReadwriteArray1<'py, f32>>,
+    uv: Option<PyReadwriteArray2<'py, f32>>,
+    z: Option<PyReadwriteArray1<'py, f32>>,
+    normal: Option<PyReadwriteArray2<'py, f32>>,
+    steps: Option<PyReadwriteArray1<'py, u32>>,
+    status: Option<PyReadwriteArray1<'py, u8>>,
+}
+
+impl<'py> Places<'py> {
+    /// Borrows the arrays of a dict; each is C-contiguous and writable, and none overlaps another.
+    fn borrow(out: &Bound<'py, PyDict>) -> PyResult<Self> {
+        fn place<'py, T: Element, D: Dimension>(
+            out: &Bound<'py, PyDict>,
+            name: &str,
+        ) -> PyResult<Option<PyReadwriteArray<'py, T, D>>> {
+            let Some(value) = out.get_item(name)? else { return Ok(None) };
+            let array = value.cast_into::<PyArray<T, D>>()?;
+            let refuse =
+                |error| PyValueError::new_err(format!("out[{name:?}] cannot be written to: {error}"));
+            Ok(Some(array.try_readwrite().map_err(refuse)?))
+        }
+        Ok(Self {
+            t: place(out, "t")?,
+            uv: place(out, "uv")?,
+            z: place(out, "z")?,
+            normal: place(out, "normal")?,
+            steps: place(out, "steps")?,
+            status: place(out, "status")?,
+        })
+    }
+
+    fn slices(&mut self) -> PyResult<HitsMut<'_>> {
+        fn slice<'a, T: Element, D: Dimension>(
+            array: &'a mut Option<PyReadwriteArray<'_, T, D>>,
+        ) -> PyResult<Option<&'a mut [T]>> {
+            Ok(array.as_mut().map(|array| array.as_slice_mut()).transpose()?)
+        }
+        Ok(HitsMut {
+            t: slice(&mut self.t)?,
+            uv: slice(&mut self.uv)?,
+            z: slice(&mut self.z)?,
+            normal: slice(&mut self.normal)?,
+            steps: slice(&mut self.steps)?,
+            status: slice(&mut self.status)?,
+        })
+    }
+}
+
+/// Names a ray by its place in the whole batch, of which these rays are the part from `first` on.
+fn in_batch(error: HeightFieldError, first: usize) -> HeightFieldError {
+    match error {
+        HeightFieldError::RayNotFinite { index, what } => {
+            HeightFieldError::RayNotFinite { index: index + first, what }
+        }
+        HeightFieldError::RayZeroDirection { index } => {
+            HeightFieldError::RayZeroDirection { index: index + first }
+        }
+        other => other,
+    }
+}
+
+/// Marches on the CPU, into the arrays of `out`: output names to arrays of N rows.
+///
+/// `first` is the number of rays before these, for messages.
 #[pyfunction]
+#[pyo3(signature = (field, origins, directions, technique, parameters, out, from_surface, first=0, cancel=None))]
 #[expect(clippy::too_many_arguments, reason = "one flat call from the Python facade")]
 pub fn march<'py>(
     py: Python<'py>,
@@ -118,16 +210,21 @@ pub fn march<'py>(
     directions: Rays<'py>,
     technique: &str,
     parameters: Vec<(String, f64)>,
-    outputs: Vec<String>,
+    out: &Bound<'py, PyDict>,
     from_surface: bool,
-) -> PyResult<Bound<'py, PyDict>> {
+    first: usize,
+    cancel: Option<&Cancel>,
+) -> PyResult<()> {
     let technique = parse_technique(technique, &parameters)?;
-    let outputs = parse_outputs(&outputs)?;
     let field = field.shared();
     let (origins, directions) = (origins.view("origins")?, directions.view("directions")?);
-    let hits = run(py, None, |task| {
-        let options = MarchOptions { outputs, from_surface, cancel: Some(task.cancel_flag()) };
-        heightfield::march(&field, &technique, origins, directions, &options)
-    })?;
-    hits_to_dict(py, hits)
+    let mut places = Places::borrow(out)?;
+    let places = places.slices()?;
+    let flag = cancel.map(|cancel| &cancel.flag);
+    run(py, None, |task| {
+        let cancel = Some(flag.unwrap_or(task.cancel_flag()));
+        let options = MarchOptions { outputs: OutputSet::NONE, from_surface, cancel };
+        heightfield::march_into(&field, &technique, origins, directions, &options, places)
+            .map_err(|error| in_batch(error, first))
+    })
 }
