@@ -39,6 +39,7 @@ SIGNATURES = {
     "Mesh": "positions indices uvs * normals tangents",
     "Mesh.open": "path",
     "Mesh.tangents": "self method",
+    "tangents": "positions indices uvs normals method * weld flip_v",
     "Camera.look_at": "eye target up fov_y",
     "Light.directional": "direction color intensity",
     "Light.point": "position color intensity",

@@ -15,9 +15,10 @@ from ._bumpwgpu import VERSION as __version__
 from .baking import Maps, bake
 from .compare import CompareResult, Recommendation, Scene, compare
 from .errors import BakeError, BumpError, BumpWarning, CompareError, MeshError, RenderError
+from .frames import Tangents, tangents
 from .heightmap import HeightMap
 from .marching import Hits, march
-from .meshes import Mesh, MeshMaterial, Part, Tangents
+from .meshes import Mesh, MeshMaterial, Part
 from .rendering import Frame, render
 from .scene import Camera, Light, Material
 from .streaming import march_stream
@@ -55,5 +56,6 @@ __all__ = [
     "march",
     "march_stream",
     "render",
+    "tangents",
     "techniques",
 ]

@@ -48,6 +48,7 @@ __all__ = [
     "save_map",
     "simd_level",
     "tangent_methods",
+    "tangents",
     "techniques",
     "threads",
 ]
@@ -254,6 +255,14 @@ def save_map(
     bits: int,
 ) -> list[Path]: ...
 def simd_level() -> str: ...
-def tangent_methods() -> list[str]: ...
+def tangents(
+    positions: NDArray[np.float32],
+    indices: NDArray[np.uint32],
+    uvs: NDArray[np.float32],
+    normals: NDArray[np.float32] | None,
+    method: str,
+    weld: bool,
+) -> tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.uint32], list[str]]: ...
+def tangent_methods() -> list[list[str]]: ...
 def techniques() -> list[_TechniqueEntry]: ...
 def threads() -> int: ...

@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _bumpwgpu
-from ._checks import choice, number, rows, whole
+from ._checks import choice, number, whole
 from ._images import read_encoded
 from .errors import BumpWarning
+from .frames import TANGENT_METHODS, Tangents, floats, whole_rows
 from .heightmap import HeightMap
 from .scene import Material
 
-__all__ = ["Mesh", "MeshMaterial", "Part", "Tangents"]
+__all__ = ["Mesh", "MeshMaterial", "Part"]
 
 #: Height range of a bump or displacement map whose file says nothing about its unit, as a share of
 #: the width of one texture tile.
@@ -41,25 +42,6 @@ class Part(NamedTuple):
     name: str
     triangles: slice
     material: int | None
-
-
-class Tangents(NamedTuple):
-    """Tangent frames, and the vertices they need.
-
-    Attributes
-    ----------
-    tangents : ndarray of float32, (M, 4)
-        As in glTF: xyz of unit length, w = +1 or -1; ``w * cross(normal, tangent)`` points up the image.
-    indices : ndarray of uint32, (T, 3)
-        Triangles over the M vertices.
-    source : ndarray of uint32, (M,)
-        The vertex of the mesh that each of them is a copy of; where frames of one vertex differ
-        (mirrored charts, seams) it was split.
-    """
-
-    tangents: NDArray[np.float32]
-    indices: NDArray[np.uint32]
-    source: NDArray[np.uint32]
 
 
 @dataclass(frozen=True)
@@ -145,11 +127,11 @@ class Mesh:
     ) -> None:
         self._adopt(
             _bumpwgpu.Mesh.from_arrays(
-                _floats("positions", positions, 3),
-                _triangles(indices),
-                _floats("uvs", uvs, 2),
-                None if normals is None else _floats("normals", normals, 3),
-                None if tangents is None else _floats("tangents", tangents, 4),
+                floats("positions", positions, 3),
+                whole_rows(indices),
+                floats("uvs", uvs, 2),
+                None if normals is None else floats("normals", normals, 3),
+                None if tangents is None else floats("tangents", tangents, 4),
             )
         )
         _tell(self)
@@ -389,15 +371,16 @@ class Mesh:
     def tangents(self, method: str = "mikktspace") -> Tangents:
         """Tangent frames by some method; the mesh itself stays as it is.
 
-        Works on the triangles. An OBJ file with quads got the :attr:`vertex_tangents` of its quads when it
-        was opened, as Blender computes them; on triangles the same vertex may differ by some degrees.
+        MikkTSpace sees the quads of an OBJ file whole, as Blender does; the other methods see triangles.
+        :func:`bumpwgpu.tangents` does the same for plain arrays.
 
         Parameters
         ----------
-        method : {"mikktspace", "dietrich"}
-            ``"mikktspace"`` is the standard of glTF, Blender and Unreal (Mikkelsen 2008), run on
-            unindexed corners; ``"dietrich"`` is one frame per triangle (Dietrich, Game Programming
-            Gems, 2000).
+        method : str, default "mikktspace"
+            ``"mikktspace"``: the standard of glTF, Blender and Unreal (Mikkelsen 2008). ``"dietrich"``,
+            ``"edge"``, ``"derivative"``: one frame a triangle. ``"averaged"``, ``"uv_gradient"``: one
+            frame a vertex. ``"split"``: a vertex for each corner. ``"axis"``: blind to the texture.
+            ``bumpwgpu.frames.TANGENT_METHODS`` says what each guarantees and where it comes from.
 
         Returns
         -------
@@ -417,7 +400,7 @@ class Mesh:
         >>> bw.Mesh.quad().tangents().tangents[0].tolist()
         [1.0, 0.0, 0.0, 1.0]
         """
-        choice("method", method, tuple(_bumpwgpu.tangent_methods()))
+        choice("method", method, tuple(TANGENT_METHODS))
         tangents, indices, source, texts = self._core.tangents(method)
         for text in texts:
             warnings.warn(text, BumpWarning, stacklevel=2)
@@ -491,18 +474,3 @@ def _checked_path(path: str | os.PathLike[str]) -> Path:
 
 def _image(source: Path | bytes | None) -> Any:
     return read_encoded(source) if isinstance(source, bytes) else source
-
-
-def _floats(name: str, values: ArrayLike, width: int) -> NDArray[np.float32]:
-    with np.errstate(over="ignore"):
-        return np.require(rows(name, values, width), np.float32, ("C", "A"))
-
-
-def _triangles(values: ArrayLike) -> NDArray[np.uint32]:
-    array = rows("indices", values, 3)
-    if array.dtype.kind == "f":
-        raise TypeError(f"indices must be whole numbers, got dtype {array.dtype}")
-    if array.size and (int(array.min()) < 0 or int(array.max()) > 0xFFFFFFFF):
-        row = int(np.argmax(((array < 0) | (array > 0xFFFFFFFF)).any(axis=1)))
-        raise ValueError(f"indices: triangle {row} is {array[row].tolist()}; vertices are counted from 0")
-    return np.require(array, np.uint32, ("C", "A"))

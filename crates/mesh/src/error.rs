@@ -60,6 +60,14 @@ pub enum MeshError {
         /// What it should be.
         expected: &'static str,
     },
+    /// No tangent method has that name.
+    #[error("unknown tangent method {name:?}; known: {known}")]
+    UnknownMethod {
+        /// The name asked for.
+        name: String,
+        /// The names there are.
+        known: String,
+    },
     /// The mesh is larger than this crate accepts.
     #[error("{what}: {got}, at most {limit} accepted")]
     TooLarge {

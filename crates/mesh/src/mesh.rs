@@ -7,7 +7,7 @@ use glam::{Vec2, Vec3, Vec4};
 
 use crate::arrays::{Arrays, checked};
 use crate::error::MeshError;
-use crate::frame::{FrameMethod, Split, Surface, derivatives, tangents};
+use crate::frame::{FrameMethod, Split, Surface, derivatives};
 use crate::material::MaterialSource;
 
 /// A run of triangles with one name and one material.
@@ -35,6 +35,9 @@ pub struct Mesh {
     pub uvs: Vec<Vec2>,
     /// Triangles, counter-clockwise seen from outside.
     pub indices: Vec<[u32; 3]>,
+    /// Ascending: triangles `abc` that the next one, `acd`, makes a quad of the file. MikkTSpace sees
+    /// such quads whole; everything else sees triangles.
+    pub quads: Vec<u32>,
     /// Tangents as in glTF: `xyz` unit, `w` = +1 or -1; `w (N x T)` points *up* the image.
     pub tangents: Vec<Vec4>,
     /// `dP/du`, mesh units per UV unit, not normalised.
@@ -136,6 +139,7 @@ impl Mesh {
             positions: arrays.positions,
             uvs: arrays.uvs,
             indices: arrays.indices,
+            quads: quads.to_vec(),
             ..Self::default()
         };
         match arrays.tangents {
@@ -143,7 +147,7 @@ impl Mesh {
                 mesh.tangents = crate::frame::convention::repair(&given, &mesh.normals, &mut warnings);
             }
             None => {
-                let split = mesh.surface(quads).tangents(FrameMethod::MikkTSpace)?;
+                let split = mesh.tangents(FrameMethod::MIKKTSPACE)?;
                 mesh.apply(split, &mut warnings);
             }
         }
@@ -154,18 +158,11 @@ impl Mesh {
 
     /// Tangents of this mesh by another method; the mesh itself stays as it is.
     ///
-    /// They come from the triangles: where an OBJ has quads, MikkTSpace run here may differ by some
-    /// degrees from the tangents the mesh was read with.
-    ///
     /// # Errors
     /// [`MeshError::TooLarge`] when splitting would make too many vertices.
     pub fn tangents(&self, method: FrameMethod) -> Result<Split, MeshError> {
-        tangents(method, &self.positions, &self.normals, &self.uvs, &self.indices)
-    }
-
-    fn surface<'a>(&'a self, quads: &'a [u32]) -> Surface<'a> {
-        let Self { positions, normals, uvs, indices, .. } = self;
-        Surface { positions, normals, uvs, indices, quads }
+        let Self { positions, normals, uvs, indices, quads, .. } = self;
+        Surface { positions, normals, uvs, indices, quads }.tangents(method)
     }
 
     /// This mesh with its vertices split and its frames replaced by another method's.

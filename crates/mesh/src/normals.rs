@@ -20,7 +20,10 @@ pub(crate) fn complete(arrays: &Arrays, warnings: &mut Vec<String>) -> Vec<Vec3>
         None => return smooth(&arrays.positions, &arrays.indices),
         Some(given) => given,
     };
-    let unit: Vec<Option<Vec3>> = given.iter().map(|n| unit(n.as_dvec3())).collect();
+    // Normals that are of unit length already stay as they are, bit for bit.
+    let is_unit = |n: Vec3| (n.as_dvec3().length_squared() - 1.0).abs() <= 4.0 * f64::from(f32::EPSILON);
+    let unit: Vec<Option<Vec3>> =
+        given.iter().map(|&n| if is_unit(n) { Some(n) } else { unit(n.as_dvec3()) }).collect();
     let missing = unit.iter().filter(|n| n.is_none()).count();
     if missing == 0 {
         return unit.into_iter().flatten().collect();

@@ -48,7 +48,7 @@ fn counting_v_upwards_would_flip_w() {
     let mesh = mirrored();
     let flipped: Vec<Vec2> = mesh.uvs.iter().map(|t| Vec2::new(t.x, 1.0 - t.y)).collect();
     let split =
-        tangents(FrameMethod::MikkTSpace, &mesh.positions, &mesh.normals, &flipped, &mesh.indices).unwrap();
+        tangents(FrameMethod::MIKKTSPACE, &mesh.positions, &mesh.normals, &flipped, &mesh.indices).unwrap();
     for (triangle, given) in split.indices.iter().zip(&mesh.indices) {
         for (new, old) in triangle.iter().zip(given) {
             assert_eq!(split.tangents[*new as usize].w, -mesh.tangents[*old as usize].w);
@@ -61,7 +61,7 @@ fn splitting_keeps_the_given_vertices_in_front() {
     let mesh = mirrored();
     let joined: Vec<u32> = vec![0, 1, 2, 3, 4, 5];
     let split: Split = tangents(
-        FrameMethod::MikkTSpace,
+        FrameMethod::MIKKTSPACE,
         &mesh.positions[..6],
         &mesh.normals[..6],
         &mesh.uvs[..6],
@@ -90,7 +90,8 @@ fn dietrich_is_the_inverse_of_the_uv_edges() {
 
 #[test]
 fn dietrich_frames_are_one_per_face() {
-    let mesh = Mesh::torus(1.0, 0.4, 12, 8).unwrap().with_tangents(FrameMethod::Dietrich).unwrap();
+    let mesh =
+        Mesh::torus(1.0, 0.4, 12, 8).unwrap().with_tangents(FrameMethod::named("dietrich").unwrap()).unwrap();
     assert_sound(&mesh, "dietrich");
     for triangle in &mesh.indices {
         let at = triangle.map(|i| i as usize);
@@ -116,7 +117,7 @@ fn degenerate_uvs_are_finite_and_said() {
         [[1e30, 1e30], [-1e30, 1e30], [1e30, 1e30], [1e30, 1e30]],
         [[1e-40, 0.], [0., 1e-40], [0., 0.], [0., 0.]],
     ] {
-        for method in FrameMethod::ALL {
+        for method in FrameMethod::all().iter().copied() {
             let mesh = Mesh::from_arrays(&positions, &indices, &uvs, None, None).unwrap();
             assert_sound(&mesh, "degenerate");
             assert!(mesh.warnings.iter().any(|w| w.contains("degenerate")), "{uvs:?}: {:?}", mesh.warnings);
@@ -176,17 +177,17 @@ fn fan(count: u32) -> (Vec<Vec3>, Vec<Vec3>, Vec<Vec2>, Vec<[u32; 3]>) {
     (positions, normals, uvs, indices)
 }
 
-/// MikkTSpace recurses around a vertex and compares all pairs of faces there.
+/// The reference recurses around a vertex and compares all pairs of faces there.
 #[test]
 fn huge_fans_neither_overflow_the_stack_nor_hang() {
     for count in [300, 5_000, 10_000, 200_000] {
         let (positions, normals, uvs, indices) = fan(count);
         let start = Instant::now();
-        let split = tangents(FrameMethod::MikkTSpace, &positions, &normals, &uvs, &indices).unwrap();
+        let split = tangents(FrameMethod::MIKKTSPACE, &positions, &normals, &uvs, &indices).unwrap();
         assert!(start.elapsed() < Duration::from_secs(20), "{count}: {:?}", start.elapsed());
         assert!(split.tangents.iter().all(|t| t.is_finite()));
-        let fell_back = split.warnings.iter().any(|w| w.contains("too many"));
-        assert_eq!(fell_back, count > 100_000, "{count}: {:?}", split.warnings);
+        // u runs along +X and the cone is even all around.
+        assert!(split.tangents[0].abs_diff_eq(Vec4::new(1.0, 0.0, 0.0, 1.0), 1e-3), "{}", split.tangents[0]);
     }
 }
 
@@ -216,7 +217,7 @@ fn stacked_triangles_do_not_hang() {
 }
 
 fn compare_with_plain(mesh: &Mesh, what: &str) {
-    let split = mesh.tangents(FrameMethod::MikkTSpace).unwrap();
+    let split = mesh.tangents(FrameMethod::MIKKTSPACE).unwrap();
     let triangles: Vec<Vec<u32>> = mesh.indices.iter().map(|t| t.to_vec()).collect();
     let plain = plain_mikktspace(mesh, &triangles).concat();
     let mut compared = 0;
@@ -286,7 +287,7 @@ proptest! {
         );
         if let Ok(mesh) = made {
             assert_sound(&mesh, "any");
-            for method in FrameMethod::ALL {
+            for method in FrameMethod::all().iter().copied() {
                 assert_sound(&mesh.with_tangents(method).unwrap(), "any");
             }
         }

@@ -140,7 +140,7 @@ fn averaged_frames_approach_the_closed_forms() {
     {
         let found = derivatives(&mesh.positions, &mesh.normals, &mesh.uvs, &mesh.tangents, &mesh.indices);
         assert!(found.warnings.is_empty(), "{name}: {:?}", found.warnings);
-        let split = mesh.tangents(FrameMethod::MikkTSpace).unwrap();
+        let split = mesh.tangents(FrameMethod::MIKKTSPACE).unwrap();
         assert_eq!(split.source.len(), mesh.positions.len(), "{name}: nothing to split");
         for i in 0..mesh.positions.len() {
             // Next to a pole the triangles span a finite turn however fine the mesh.

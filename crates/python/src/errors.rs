@@ -78,7 +78,9 @@ impl Raise for BakeError {
                 io(source.kind(), message.clone()).unwrap_or_else(|| PyBakeError::new_err(message))
             }
             Self::HeightField(error) => error.raise(),
-            Self::UnknownName { .. } | Self::Shape { .. } | Self::Option { .. } => PyValueError::new_err(message),
+            Self::UnknownName { .. } | Self::Shape { .. } | Self::Option { .. } => {
+                PyValueError::new_err(message)
+            }
             _ => PyBakeError::new_err(message),
         }
     }
@@ -92,7 +94,9 @@ impl Raise for MeshError {
             Self::Read { source, .. } => {
                 io(source.kind(), message.clone()).unwrap_or_else(|| PyMeshError::new_err(message))
             }
-            Self::Parameter { .. } | Self::Arrays { .. } => PyValueError::new_err(message),
+            Self::Parameter { .. } | Self::Arrays { .. } | Self::UnknownMethod { .. } => {
+                PyValueError::new_err(message)
+            }
             _ => PyMeshError::new_err(message),
         }
     }

@@ -32,7 +32,7 @@ mod _bumpwgpu {
     #[pymodule_export]
     use crate::march::{Cancel, march, techniques};
     #[pymodule_export]
-    use crate::mesh::{PyMesh, tangent_methods};
+    use crate::mesh::{PyMesh, tangent_methods, tangents};
     #[pymodule_export]
     use crate::rendering::{PyMaterial, adapters, aov_names, march_gpu, render_scene};
     #[pymodule_export]

@@ -42,6 +42,14 @@ fn rows<const W: usize, T: numpy::Element + Copy>(
     Ok(array.as_slice()?.as_chunks::<W>().0.to_vec())
 }
 
+/// A C-contiguous `(N, W)` array as vectors.
+fn vectors<const W: usize, V: From<[f32; W]>>(
+    array: &PyReadonlyArray2<'_, f32>,
+    name: &str,
+) -> PyResult<Vec<V>> {
+    Ok(rows::<W, f32>(array, name)?.into_iter().map(V::from).collect())
+}
+
 /// Vectors as an `(N, W)` array.
 fn array<'py, const W: usize, T: numpy::Element>(
     py: Python<'py>,
@@ -227,8 +235,48 @@ impl PyMesh {
     }
 }
 
-/// Names of the tangent methods.
+/// Tangents for plain arrays: triangles `(F, 3)` or quads `(F, 4)`, which come back as they came.
 #[pyfunction]
-pub fn tangent_methods() -> Vec<&'static str> {
-    FrameMethod::ALL.iter().map(|method| method.name()).collect()
+pub fn tangents<'py>(
+    py: Python<'py>,
+    positions: PyReadonlyArray2<'py, f32>,
+    indices: PyReadonlyArray2<'py, u32>,
+    uvs: PyReadonlyArray2<'py, f32>,
+    normals: Option<PyReadonlyArray2<'py, f32>>,
+    method: &str,
+    weld: bool,
+) -> PyResult<SplitArrays<'py>> {
+    let method = FrameMethod::named(method).map_err(Raise::raise)?;
+    let mut arrays = mesh::arrays::Arrays {
+        positions: vectors(&positions, "positions")?,
+        normals: normals.map(|n| vectors(&n, "normals")).transpose()?,
+        uvs: vectors(&uvs, "uvs")?,
+        ..Default::default()
+    };
+    let mut quads = Vec::new();
+    let is_quads = indices.shape()[1] == 4;
+    if is_quads {
+        (arrays.indices, quads) = mesh::frame::triangles_of_quads(&rows(&indices, "indices")?);
+    } else {
+        arrays.indices = rows(&indices, "indices")?;
+    }
+    let split = run(py, None, |_| mesh::frame::tangents_of_arrays(method, arrays, &quads, weld))?;
+    let faces = if is_quads {
+        array(py, mesh::frame::quads_of_triangles(&split.indices).into_iter())?
+    } else {
+        array(py, split.indices.into_iter())?
+    };
+    Ok((
+        array(py, split.tangents.iter().map(|t| t.to_array()))?,
+        faces,
+        PyArray1::from_vec(py, split.source),
+        split.warnings,
+    ))
+}
+
+/// Name, summary, guarantee and source of each tangent method.
+#[pyfunction]
+pub fn tangent_methods() -> Vec<[&'static str; 4]> {
+    let methods = FrameMethod::all().iter();
+    methods.map(|m| [m.name(), m.summary(), m.guarantee(), m.source()]).collect()
 }

@@ -4,7 +4,10 @@
 //! is defined by the bitangent `B = w (N x T)`, which points *up* it (green of a normal map = up).
 //! Hence `B` is along `-dP/dv`, and MikkTSpace, whose `w` follows growing `v`, is fed `-v`.
 
-use glam::{DVec3, Vec2, Vec3, Vec4};
+use glam::{DQuat, DVec3, Vec2, Vec3, Vec4};
+
+/// The smallest share of a vector's length that must lie in the surface for its direction to count.
+const MIN_SHARE: f64 = 1e-6;
 
 /// The bitangent, up the image: `w (N x T)`.
 pub fn bitangent(normal: Vec3, tangent: Vec4) -> Vec3 {
@@ -21,6 +24,18 @@ pub fn handedness(normal: DVec3, dpdu: DVec3, dpdv: DVec3) -> f32 {
 /// Subtracting from zero also turns -0 into +0, which would otherwise not weld with it.
 pub(super) fn v_up(uv: Vec2) -> [f32; 2] {
     [uv.x + 0.0, 0.0 - uv.y]
+}
+
+/// The direction of `v` in the plane of a unit normal, or `None` when `v` runs along the normal.
+pub(super) fn in_surface(normal: DVec3, v: DVec3) -> Option<DVec3> {
+    let flat = v - normal * normal.dot(v);
+    if flat.length() > MIN_SHARE * v.length() { flat.try_normalize() } else { None }
+}
+
+/// The shortest turn that takes the normal of a triangle's plane onto a vertex normal. A triangle
+/// wound against its normals is turned by its nearer side, not flipped over.
+pub(super) fn turn(plane: DVec3, normal: DVec3) -> DQuat {
+    DQuat::from_rotation_arc(plane * plane.dot(normal).signum(), normal)
 }
 
 /// Some unit tangent perpendicular to a unit normal, for where UVs give none.

@@ -29,7 +29,7 @@ pub(super) fn fill(
     let count = arbitrary.iter().filter(|&&a| a).count();
     if count > 0 {
         warnings.push(format!(
-            "{count} vertices have degenerate UVs; their tangents are arbitrary directions in the surface"
+            "{count} vertices have degenerate UVs or normals; their tangents are arbitrary directions in the surface"
         ));
     }
     filled

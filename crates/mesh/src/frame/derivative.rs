@@ -1,98 +1,36 @@
-//! `dP/du` and `dP/dv` at the vertices: the metric of the texture on the surface.
+//! What a shader finds without any stored tangent: the triangle's `dP/du`, turned with the shortest
+//! turn from the triangle's plane onto the smooth normal. The difference to projecting it, as
+//! [`dietrich`](super::dietrich) does, is second order in the bend.
 //!
-//! Each triangle's derivatives are turned, without change of length or angle, from its own plane
-//! into the plane of the vertex normal, then averaged over the triangles of the vertex. Weights are
-//! the angle at the vertex times the sine of the UV angle there, so that slivers in either space
-//! count for little and no weight times derivative grows without bound. Triangles with mirrored
-//! UVs are averaged apart from the others, and the heavier side wins: the two never cancel.
+//! On the device the same comes from screen-space derivatives of position and uv.
+//! Source: Mikkelsen, "Bump Mapping Unparametrized Surfaces on the GPU", 2010, and "Surface
+//! Gradient-Based Bump Mapping Framework", JCGT 2020.
 
-use glam::{DQuat, DVec3, Vec2, Vec3, Vec4};
+use glam::{DVec3, Vec4};
 
-use super::{Surface, convention};
-use crate::normals::{corner_angles, face_normal};
+use super::{FrameInfo, Surface, convention};
+use crate::normals::face_normal;
 
-/// Derivatives at each vertex.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Derivatives {
-    /// `dP/du`, mesh units per UV unit.
-    pub dpdu: Vec<Vec3>,
-    /// `dP/dv`, `v` down, mesh units per UV unit.
-    pub dpdv: Vec<Vec3>,
-    /// What had to be replaced.
-    pub warnings: Vec<String>,
-}
+pub(super) const INFO: FrameInfo = FrameInfo {
+    name: "derivative",
+    summary: "the triangle's dP/du turned onto the smooth normal, as screen-space derivatives give it",
+    guarantee: "needs no stored tangents; exact on the triangle, facets show as with dietrich",
+    source: "Mikkelsen, Bump Mapping Unparametrized Surfaces on the GPU, 2010; Surface Gradient-Based \
+             Bump Mapping Framework, JCGT 2020",
+    shares: true,
+    corners,
+};
 
-#[derive(Clone, Copy, Default)]
-struct Sum {
-    dpdu: DVec3,
-    dpdv: DVec3,
-    weight: f64,
-}
-
-/// Averaged derivatives for each vertex of a checked mesh (equal lengths, indices in range).
-///
-/// A vertex without any sound UV triangle gets its tangent frame with a length of one mesh unit per
-/// UV unit, and the warnings count such vertices.
-pub fn derivatives(
-    positions: &[Vec3],
-    normals: &[Vec3],
-    uvs: &[Vec2],
-    tangents: &[Vec4],
-    indices: &[[u32; 3]],
-) -> Derivatives {
-    let surface = Surface { positions, normals, uvs, indices, quads: &[] };
-    let mut sums = vec![[Sum::default(); 2]; positions.len()];
-    for (face, triangle) in indices.iter().enumerate() {
-        let plane = face_normal(positions, triangle);
-        let Some(frame) = surface.face_frame(face).filter(|_| plane != DVec3::ZERO) else { continue };
-        let side = usize::from(frame.dpdu.cross(frame.dpdv).dot(plane) > 0.0);
-        let angles = corner_angles(positions, triangle);
-        for (corner, &vertex) in triangle.iter().enumerate() {
-            let normal = normals[vertex as usize].as_dvec3();
-            // A face wound against its normals is turned by its nearer side, not flipped over.
-            let turn = DQuat::from_rotation_arc(plane * plane.dot(normal).signum(), normal);
-            let weight = angles[corner] * uv_sine(uvs, triangle, corner);
-            let sum = &mut sums[vertex as usize][side];
-            sum.dpdu += weight * (turn * frame.dpdu);
-            sum.dpdv += weight * (turn * frame.dpdv);
-            sum.weight += weight;
+fn corners(surface: Surface<'_>) -> Vec<Option<Vec4>> {
+    surface.each_corner(|face| {
+        let plane = face_normal(surface.positions, &surface.indices[face]);
+        let frame = surface.face_frame(face).filter(|_| plane != DVec3::ZERO);
+        move |_, normal| {
+            let frame = frame?;
+            let turned = convention::turn(plane, normal) * frame.dpdu;
+            // Projected once more: rounding must not leave it outside the surface.
+            let tangent = convention::in_surface(normal, turned)?;
+            Some(tangent.as_vec3().extend(convention::handedness(normal, frame.dpdu, frame.dpdv)))
         }
-    }
-    let mut result = Derivatives {
-        dpdu: Vec::with_capacity(positions.len()),
-        dpdv: Vec::with_capacity(positions.len()),
-        warnings: Vec::new(),
-    };
-    let mut used = vec![false; positions.len()];
-    indices.iter().flatten().for_each(|&i| used[i as usize] = true);
-    let mut replaced = 0usize;
-    for (vertex, [a, b]) in sums.iter().enumerate() {
-        let sum = if a.weight > b.weight { a } else { b };
-        let (dpdu, dpdv) = ((sum.dpdu / sum.weight).as_vec3(), (sum.dpdv / sum.weight).as_vec3());
-        if sum.weight > 0.0 && sound(dpdu) && sound(dpdv) {
-            result.dpdu.push(dpdu);
-            result.dpdv.push(dpdv);
-        } else {
-            replaced += usize::from(used[vertex]);
-            result.dpdu.push(tangents[vertex].truncate());
-            result.dpdv.push(-convention::bitangent(normals[vertex], tangents[vertex]));
-        }
-    }
-    if replaced > 0 {
-        result.warnings.push(format!(
-            "{replaced} vertices have degenerate UVs; their texture scale is set to 1 mesh unit"
-        ));
-    }
-    result
-}
-
-fn sound(v: Vec3) -> bool {
-    v.is_finite() && v != Vec3::ZERO
-}
-
-fn uv_sine(uvs: &[Vec2], triangle: &[u32; 3], corner: usize) -> f64 {
-    let t = |i: usize| uvs[triangle[i % 3] as usize].as_dvec2();
-    let (e, f) = (t(corner + 1) - t(corner), t(corner + 2) - t(corner));
-    let lengths = e.length() * f.length();
-    if lengths > 0.0 { (e.perp_dot(f) / lengths).abs() } else { 0.0 }
+    })
 }

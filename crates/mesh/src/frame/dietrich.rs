@@ -7,7 +7,17 @@
 
 use glam::{DVec2, DVec3, Vec4};
 
-use super::{Surface, convention};
+use super::{FrameInfo, Surface, convention};
+
+pub(super) const INFO: FrameInfo = FrameInfo {
+    name: "dietrich",
+    summary: "one frame a triangle, from the planes that x, y and z form over (u, v)",
+    guarantee: "dP/du of the triangle exactly, projected onto the vertex normals; nothing is averaged, so \
+                facets show",
+    source: "Dietrich, Texture Space Bump Maps, Game Programming Gems, 2000",
+    shares: true,
+    corners,
+};
 
 /// Sine of the smallest angle between two UV edges that still counts as a UV triangle.
 const MIN_UV_SINE: f64 = 1e-7;
@@ -49,22 +59,14 @@ impl Surface<'_> {
     }
 }
 
-/// A tangent for each corner: the face's `dP/du` made perpendicular to the corner's normal.
+/// The face's `dP/du` made perpendicular to the corner's normal.
 pub(super) fn corners(surface: Surface<'_>) -> Vec<Option<Vec4>> {
-    let mut result = Vec::with_capacity(surface.indices.len() * 3);
-    for (face, triangle) in surface.indices.iter().enumerate() {
+    surface.each_corner(|face| {
         let frame = surface.face_frame(face);
-        for &vertex in triangle {
-            let normal = surface.normals[vertex as usize].as_dvec3();
-            result.push(frame.and_then(|frame| {
-                let tangent = frame.dpdu - normal * normal.dot(frame.dpdu);
-                // The face may be seen edge-on from a bent normal; then nothing is left to keep.
-                (tangent.length() > 1e-6 * frame.dpdu.length()).then(|| {
-                    let w = convention::handedness(normal, frame.dpdu, frame.dpdv);
-                    tangent.normalize().as_vec3().extend(w)
-                })
-            }));
+        move |_, normal| {
+            let frame = frame?;
+            let tangent = convention::in_surface(normal, frame.dpdu)?;
+            Some(tangent.as_vec3().extend(convention::handedness(normal, frame.dpdu, frame.dpdv)))
         }
-    }
-    result
+    })
 }

@@ -1,10 +1,9 @@
 //! From one tangent a corner back to one tangent a vertex.
 
-use std::collections::HashMap;
+use glam::Vec4;
+use hashbrown::HashMap;
 
-use glam::{Vec3, Vec4};
-
-use super::convention;
+use super::{Surface, convention};
 use crate::error::MeshError;
 use crate::limits::check_elements;
 
@@ -25,31 +24,35 @@ pub struct Split {
     pub warnings: Vec<String>,
 }
 
-/// Joins corners of one vertex that have the same tangent, bit for bit.
+/// Joins corners of one vertex that have the same tangent, bit for bit; unless `shares`, none.
 pub(super) fn join(
-    vertices: usize,
-    normals: &[Vec3],
-    indices: &[[u32; 3]],
+    surface: Surface<'_>,
     corners: &[Vec4],
+    shares: bool,
     warnings: Vec<String>,
 ) -> Result<Split, MeshError> {
+    let vertices = surface.positions.len();
     let mut first: Vec<Option<Vec4>> = vec![None; vertices];
     let mut extra: HashMap<(u32, [u32; 4]), u32> = HashMap::new();
     let mut source: Vec<u32> = (0..vertices as u32).collect();
     let mut copies: Vec<Vec4> = Vec::new();
-    let mut joined = Vec::with_capacity(indices.len());
-    for (triangle, tangents) in indices.iter().zip(corners.chunks_exact(3)) {
+    let mut joined = Vec::with_capacity(surface.indices.len());
+    for (triangle, tangents) in surface.indices.iter().zip(corners.chunks_exact(3)) {
         let mut row = [0; 3];
         for ((slot, &vertex), &tangent) in row.iter_mut().zip(triangle).zip(tangents) {
+            let fresh = first[vertex as usize].is_none();
             let known = *first[vertex as usize].get_or_insert(tangent);
-            *slot = if known == tangent {
+            let mut copy = || {
+                source.push(vertex);
+                copies.push(tangent);
+                source.len() as u32 - 1
+            };
+            *slot = if fresh || shares && known == tangent {
                 vertex
+            } else if shares {
+                *extra.entry((vertex, tangent.to_array().map(f32::to_bits))).or_insert_with(copy)
             } else {
-                *extra.entry((vertex, tangent.to_array().map(f32::to_bits))).or_insert_with(|| {
-                    source.push(vertex);
-                    copies.push(tangent);
-                    source.len() as u32 - 1
-                })
+                copy()
             };
         }
         joined.push(row);
@@ -57,7 +60,7 @@ pub(super) fn join(
     check_elements("vertices after splitting for tangents", source.len())?;
     let mut tangents: Vec<Vec4> = first
         .into_iter()
-        .zip(normals)
+        .zip(surface.normals)
         .map(|(tangent, &normal)| tangent.unwrap_or_else(|| convention::any_tangent(normal)))
         .collect();
     tangents.append(&mut copies);

@@ -3,55 +3,111 @@
 //! A frame method says which tangent each *corner* of each triangle has. Corners of one vertex that
 //! agree stay one vertex; where they differ (mirrored charts, creases in UV) the vertex is split.
 
+mod alone;
+mod averaged;
+mod axis;
 pub mod convention;
 mod degenerate;
 mod derivative;
 mod dietrich;
+mod edge;
 mod join;
+mod metric;
 mod mikktspace;
+mod split;
+mod uv_gradient;
+mod weld;
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3, Vec4};
+use rayon::prelude::*;
 
 use crate::error::MeshError;
-pub use derivative::{Derivatives, derivatives};
+pub use alone::{quads_of_triangles, tangents_of_arrays, triangles_of_quads};
 pub use dietrich::{FaceFrame, face_frame};
 pub use join::Split;
+pub use metric::{Derivatives, derivatives};
 
-/// How tangents are found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum FrameMethod {
-    /// The standard of glTF, Blender and Unreal (Mikkelsen 2008), run on unindexed corners. On
-    /// triangles; only while an OBJ is read does it see the file's quads.
-    MikkTSpace,
-    /// One frame per triangle from the plane through `(x, u, v)`, and so for y and z; `dP/du` made
-    /// perpendicular to the vertex normal (Dietrich, Game Programming Gems, 2000). Nothing is
-    /// averaged.
-    Dietrich,
+/// What a file of this folder says of its method.
+#[derive(Debug)]
+struct FrameInfo {
+    name: &'static str,
+    summary: &'static str,
+    guarantee: &'static str,
+    source: &'static str,
+    /// Whether corners of one vertex that agree stay one vertex.
+    shares: bool,
+    /// A tangent for each corner of each triangle; `None` where there is none to be had.
+    corners: fn(Surface<'_>) -> Vec<Option<Vec4>>,
 }
 
-impl FrameMethod {
-    /// Every method.
-    pub const ALL: [Self; 2] = [Self::MikkTSpace, Self::Dietrich];
+/// Every method: a new one is a file and a line here.
+static METHODS: [FrameMethod; 8] = [
+    FrameMethod::MIKKTSPACE,
+    FrameMethod(&dietrich::INFO),
+    FrameMethod(&edge::INFO),
+    FrameMethod(&axis::INFO),
+    FrameMethod(&averaged::INFO),
+    FrameMethod(&split::INFO),
+    FrameMethod(&uv_gradient::INFO),
+    FrameMethod(&derivative::INFO),
+];
 
-    /// The name used in Python: `"mikktspace"`, `"dietrich"`.
+/// How tangents are found; named in the registry of this module.
+#[derive(Clone, Copy)]
+pub struct FrameMethod(&'static FrameInfo);
+
+impl FrameMethod {
+    /// The standard of glTF, Blender and Unreal.
+    pub const MIKKTSPACE: Self = Self(&mikktspace::INFO);
+
+    /// Every method, the standard first.
+    pub fn all() -> &'static [Self] {
+        &METHODS
+    }
+
+    /// The name used in Python, such as `"mikktspace"`.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::MikkTSpace => "mikktspace",
-            Self::Dietrich => "dietrich",
-        }
+        self.0.name
+    }
+
+    /// What it does, in one line.
+    pub fn summary(self) -> &'static str {
+        self.0.summary
+    }
+
+    /// What can be relied on, and what cannot.
+    pub fn guarantee(self) -> &'static str {
+        self.0.guarantee
+    }
+
+    /// The work it comes from.
+    pub fn source(self) -> &'static str {
+        self.0.source
     }
 
     /// The method of that name.
     ///
     /// # Errors
-    /// [`MeshError::Parameter`] when there is none.
+    /// [`MeshError::UnknownMethod`] lists the names.
     pub fn named(name: &str) -> Result<Self, MeshError> {
-        Self::ALL.into_iter().find(|m| m.name() == name).ok_or_else(|| MeshError::Parameter {
-            name: "tangent method",
-            value: format!("{name:?}"),
-            expected: "\"mikktspace\" or \"dietrich\" expected",
+        METHODS.iter().copied().find(|m| m.name() == name).ok_or_else(|| MeshError::UnknownMethod {
+            name: name.to_owned(),
+            known: METHODS.map(Self::name).join(", "),
         })
+    }
+}
+
+impl PartialEq for FrameMethod {
+    fn eq(&self, other: &Self) -> bool {
+        self.name() == other.name()
+    }
+}
+
+impl Eq for FrameMethod {}
+
+impl std::fmt::Debug for FrameMethod {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "FrameMethod({:?})", self.name())
     }
 }
 
@@ -70,12 +126,24 @@ impl Surface<'_> {
     /// A tangent for each vertex, splitting where those of its corners differ.
     pub(crate) fn tangents(self, method: FrameMethod) -> Result<Split, MeshError> {
         let mut warnings = Vec::new();
-        let corners = match method {
-            FrameMethod::MikkTSpace => mikktspace::corners(self, &mut warnings),
-            FrameMethod::Dietrich => dietrich::corners(self),
-        };
-        let corners = degenerate::fill(self, corners, &mut warnings);
-        join::join(self.positions.len(), self.normals, self.indices, &corners, warnings)
+        let corners = degenerate::fill(self, (method.0.corners)(self), &mut warnings);
+        join::join(self, &corners, method.0.shares, warnings)
+    }
+
+    /// Corners of all triangles: `prepare(face)` answers for the vertices of a face, each given with
+    /// its normal.
+    fn each_corner<F>(self, prepare: impl Fn(usize) -> F + Sync) -> Vec<Option<Vec4>>
+    where
+        F: Fn(usize, DVec3) -> Option<Vec4>,
+    {
+        let mut corners = vec![None; 3 * self.indices.len()];
+        corners.par_chunks_exact_mut(3).with_min_len(1024).enumerate().for_each(|(face, row)| {
+            let answer = prepare(face);
+            for (slot, &vertex) in row.iter_mut().zip(&self.indices[face]) {
+                *slot = answer(vertex as usize, self.normals[vertex as usize].as_dvec3());
+            }
+        });
+        corners
     }
 }
 
