@@ -9,6 +9,7 @@
 //! map is saved.
 
 pub mod bits;
+pub mod curvature;
 pub mod encode;
 pub mod error;
 pub mod files;
@@ -16,14 +17,19 @@ pub mod image;
 pub mod kernel;
 pub mod maps;
 mod memory;
+pub mod mips;
+pub mod moments;
 pub mod normal;
 pub mod progress;
 pub mod pyramid;
 pub mod relief;
+pub mod repair;
+mod resample;
 mod rows;
 pub mod slopes;
 
 pub use bits::effective_bits;
+pub use curvature::curvature;
 pub use error::BakeError;
 pub use files::{WriteOptions, decode_image, read_image, write_image, write_image_with};
 pub use image::{Image, Samples};
@@ -32,6 +38,8 @@ pub use maps::{
     Baked, Channel, FileFormat, Form, Grid, Kind, Layer, Map, MapInfo, MapOption, Options, Plan, Span, Value,
     bake, save,
 };
+pub use mips::{NormalLength, mip_chain, mip_sizes, normal_mips};
+pub use moments::{covariance, half_vector_density, moments, toksvig_roughness};
 pub use normal::{Convention, normal_map, normal_xy};
 pub use progress::Progress;
 pub use pyramid::{Level, pyramid};

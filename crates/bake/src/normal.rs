@@ -141,14 +141,20 @@ impl Factors {
         }
     }
 
+    /// Slopes of the normal, `nx / nz` and `ny / nz`, from height per texel.
+    #[inline]
+    pub(crate) fn slopes(self, gx: f32, gy: f32) -> [f32; 2] {
+        // Adding 0 turns -0 into 0: a flat map has no sign.
+        [gx * self.x + 0.0, gy * self.y + 0.0]
+    }
+
     /// Normal components of a row.
     pub(crate) fn normals(self, row: &Row<'_>, normal: &mut [Vec<f32>; 3]) {
         let [nx, ny, nz] = normal;
         let n = nx.len();
         let (gx, gy, ny, nz) = (&row.gx[..n], &row.gy[..n], &mut ny[..n], &mut nz[..n]);
         for i in 0..n {
-            // Adding 0 turns -0 into 0: a flat map has no sign.
-            let (x, y) = (gx[i] * self.x + 0.0, gy[i] * self.y + 0.0);
+            let [x, y] = self.slopes(gx[i], gy[i]);
             let inverse = 1.0 / (x * x + y * y + 1.0).sqrt();
             nx[i] = x * inverse;
             ny[i] = y * inverse;

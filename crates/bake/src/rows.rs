@@ -77,7 +77,7 @@ pub(crate) fn for_each_row<T: Send>(
 }
 
 /// A row of texels; `j` may lie beyond the map.
-fn texel_row(field: &HeightField, j: i64) -> &[f32] {
+pub(crate) fn texel_row(field: &HeightField, j: i64) -> &[f32] {
     let first = field.first_texel();
     let row = (field.wrap().index(j, field.height()) as i64 - first) as usize;
     let at = row * (field.cells()[0] + 1) + (-first) as usize;

@@ -96,7 +96,8 @@ fn files_hold_what_was_baked() {
         .unwrap()
         .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
         .filter(|name| {
-            ["wall_n", "wall_p"].iter().any(|start| name.starts_with(start)) && name.ends_with(".exr")
+            ["wall_normal.", "wall_normal_xy", "wall_p"].iter().any(|start| name.starts_with(start))
+                && name.ends_with(".exr")
         })
         .collect();
     names.sort();

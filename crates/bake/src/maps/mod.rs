@@ -11,14 +11,23 @@ mod store;
 use heightfield::HeightField;
 
 use crate::encode::{Range, Rounding};
-use crate::{BakeError, Progress, normal, pyramid, relief};
+use crate::{BakeError, Progress, curvature, mips, moments, normal, pyramid, relief};
 
 pub use options::{Kind, MapOption, Options, Value};
 pub use plan::{Grid, Plan};
 pub use store::{FileFormat, save};
 
 /// All maps that are made from heights, in the order users see them.
-pub static REGISTRY: &[&Map] = &[&normal::NORMAL, &normal::NORMAL_XY, &relief::RELIEF, &pyramid::PYRAMID];
+pub static REGISTRY: &[&Map] = &[
+    &normal::NORMAL,
+    &normal::NORMAL_XY,
+    &relief::RELIEF,
+    &pyramid::PYRAMID,
+    &mips::NORMAL_MIPS,
+    &moments::MOMENTS,
+    &moments::TOKSVIG,
+    &curvature::CURVATURE,
+];
 
 /// Which pictures a map consists of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
