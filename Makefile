@@ -14,7 +14,7 @@ ifndef XDG_RUNTIME_DIR
 export NODEVICE_SELECT := 1
 endif
 
-.PHONY: help setup device extension demo test test-rust test-python test-slow wheel bench lint clean
+.PHONY: help setup device extension demo test test-rust test-python test-slow wheel bench bench-peers lint clean
 .DEFAULT_GOAL := help
 
 help: ## list the commands
@@ -60,6 +60,9 @@ bench: setup ## time, error and instructions of every search in one table; QUICK
 	    $(if $(BASELINE),--baseline-lenient $(BASELINE),$(if $(SAVE),--save-baseline $(SAVE))) \
 	    >target/bench.log 2>&1 || { tail -20 target/bench.log >&2; exit 1; }
 	@sed -n '/^Searches: /,$$p' target/bench.log
+
+bench-peers: extension ## the same work by other programs, each in an environment of its own; PEERS="embree ..."
+	@$(PY) tests/peers/run.py $(PEERS)
 
 lint: extension ## formatting, clippy, ruff, mypy, stubtest
 	cargo fmt --all --check
