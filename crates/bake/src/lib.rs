@@ -10,9 +10,11 @@
 
 pub mod bits;
 pub mod curvature;
+pub mod distance;
 pub mod encode;
 pub mod error;
 pub mod files;
+pub mod horizon;
 pub mod image;
 pub mod kernel;
 pub mod maps;
@@ -20,6 +22,7 @@ mod memory;
 pub mod mips;
 pub mod moments;
 pub mod normal;
+pub mod occlusion;
 pub mod progress;
 pub mod pyramid;
 pub mod relief;
@@ -27,11 +30,14 @@ pub mod repair;
 mod resample;
 mod rows;
 pub mod slopes;
+mod sweep;
 
 pub use bits::effective_bits;
 pub use curvature::curvature;
+pub use distance::distance_map;
 pub use error::BakeError;
 pub use files::{WriteOptions, decode_image, read_image, write_image, write_image_with};
+pub use horizon::{azimuth, horizon_map};
 pub use image::{Image, Samples};
 pub use kernel::Kernel;
 pub use maps::{
@@ -41,6 +47,7 @@ pub use maps::{
 pub use mips::{NormalLength, mip_chain, mip_sizes, normal_mips};
 pub use moments::{covariance, half_vector_density, moments, toksvig_roughness};
 pub use normal::{Convention, normal_map, normal_xy};
+pub use occlusion::{ao_map, bent_normal_map};
 pub use progress::Progress;
 pub use pyramid::{Level, pyramid};
 pub use relief::relief_map;

@@ -11,7 +11,9 @@ mod store;
 use heightfield::HeightField;
 
 use crate::encode::{Range, Rounding};
-use crate::{BakeError, Progress, curvature, mips, moments, normal, pyramid, relief};
+use crate::{
+    BakeError, Progress, curvature, distance, horizon, mips, moments, normal, occlusion, pyramid, relief,
+};
 
 pub use options::{Kind, MapOption, Options, Value};
 pub use plan::{Grid, Plan};
@@ -27,6 +29,10 @@ pub static REGISTRY: &[&Map] = &[
     &moments::MOMENTS,
     &moments::TOKSVIG,
     &curvature::CURVATURE,
+    &horizon::HORIZON,
+    &occlusion::AO,
+    &occlusion::BENT_NORMAL,
+    &distance::DISTANCE,
 ];
 
 /// Which pictures a map consists of.

@@ -2,6 +2,7 @@
 #![allow(dead_code, missing_docs, clippy::unwrap_used)] // each test binary uses some of them
 
 pub mod tiff;
+pub mod walk;
 
 use std::path::{Path, PathBuf};
 
