@@ -78,6 +78,17 @@ pub enum MeshError {
         /// How large it may be.
         limit: u64,
     },
+    /// There is not enough memory for a result.
+    #[error("{what} needs {bytes} bytes, which are not to be had")]
+    NoMemory {
+        /// What was to be stored.
+        what: &'static str,
+        /// Its size.
+        bytes: u64,
+    },
+    /// The caller asked to stop.
+    #[error("interrupted")]
+    Interrupted,
 }
 
 impl MeshError {

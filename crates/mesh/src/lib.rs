@@ -6,12 +6,14 @@
 //!
 //! [`Mesh::open`] reads OBJ, glTF and GLB; [`Mesh::quad`], [`Mesh::cube`], [`Mesh::sphere`] and
 //! [`Mesh::torus`] generate shapes whose derivatives are exact; [`Mesh::from_arrays`] takes plain
-//! arrays. [`tangents`] alone turns arrays into arrays.
+//! arrays. [`tangents`] alone turns arrays into arrays. [`bake_detail`] makes maps of a detailed mesh on the
+//! UVs of a plain one.
 //!
 //! Readers answer bad files with a [`MeshError`]. What could be repaired or had to be left out is
 //! listed in [`Mesh::warnings`].
 
 pub mod arrays;
+pub mod detail;
 pub mod error;
 pub mod frame;
 pub mod generate;
@@ -22,6 +24,9 @@ mod mesh;
 mod normals;
 mod obj;
 
+pub use detail::{
+    DetailMaps, DetailOptions, DetailReport, NormalSpace, SkyOptions, bake_detail, tangent_map,
+};
 pub use error::MeshError;
 pub use frame::{Derivatives, FrameMethod, Split, derivatives, tangents};
 pub use material::{ImageSource, MaterialSource};

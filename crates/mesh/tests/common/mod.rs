@@ -1,6 +1,7 @@
 //! What the tests share: invariants of every mesh, and the folder of real assets.
 #![allow(dead_code)]
 
+pub mod bakes;
 pub mod plain;
 
 use std::path::{Path, PathBuf};
