@@ -1,5 +1,5 @@
 //! Baking from a detailed mesh, against closed forms.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::needless_range_loop)]
 
 mod common;
 
@@ -80,8 +80,8 @@ fn a_ball_on_a_square_is_met_where_geometry_says() {
         let square = 0.16 - x * x - y * y;
         if square > 0.01 {
             let z = square.sqrt();
-            assert!((f64::from(heights[at]) - (z + 0.1) / 0.6).abs() < 3e-4, "texel {at}");
-            assert!(angle(Map(&normal, 3).vector(at), DVec3::new(x, y, z)) < 0.05, "texel {at}");
+            assert!((f64::from(heights[at]) - (z + 0.1) / 0.6).abs() < 5e-4, "texel {at}");
+            assert!(angle(Map(&normal, 3).vector(at), DVec3::new(x, y, z)) < 0.1, "texel {at}");
             inside += 1;
         } else if square < -0.001 {
             assert_eq!(Map(&normal, 3).vector(at), DVec3::Z);

@@ -83,7 +83,7 @@ mod tests {
         let (width, height) = (23, 17);
         for seed in 0..20u32 {
             let covered: Vec<bool> = (0..width * height)
-                .map(|i| (i as u32 ^ seed).wrapping_mul(2_654_435_761).rotate_left(13) % 60 == 0)
+                .map(|i| (i as u32 ^ seed).wrapping_mul(2_654_435_761).rotate_left(13).is_multiple_of(60))
                 .collect();
             for reach in [1, 3, 8, 1000] {
                 let found = sources(&covered, width, reach);

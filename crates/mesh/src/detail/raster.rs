@@ -4,6 +4,14 @@ use std::ops::Range;
 
 use glam::DVec2;
 
+/// How far from its centre a texel can be touched, along each axis: a hair less than its edge, so
+/// that charts that end on the edge stay on their side.
+const HALF: f64 = 0.5 - 1e-4;
+
+/// How far inside the triangle a touched texel looks, texels: a ray from the very border of the plain
+/// mesh may miss the border of the detailed one by rounding.
+const INWARD: f64 = 1e-3;
+
 /// No chart.
 pub(super) const NONE: u32 = u32::MAX;
 
@@ -108,6 +116,13 @@ impl Triangle {
         first..end
     }
 
+    /// A point of the outline, moved a little towards the middle.
+    fn inward(&self, p: DVec2) -> DVec2 {
+        let [a, b, c] = self.corners;
+        let way = (a + b + c) / 3.0 - p;
+        p + way * (INWARD / way.length()).min(0.5)
+    }
+
     /// The nearest point of the triangle to a point outside.
     fn nearest(&self, p: DVec2) -> DVec2 {
         let along = |a: DVec2, b: DVec2| {
@@ -171,13 +186,13 @@ impl Window {
     pub(super) fn touch(&self, triangle: &Triangle, chart: u32, free: &[bool], found: &mut [Touch]) {
         for row in self.between(triangle.low.y - 1.0, triangle.high.y + 1.0) {
             let y = self.centre(row, 0).y;
-            if triangle.low.y > y + 0.5 || triangle.high.y < y - 0.5 {
+            if triangle.low.y > y + HALF || triangle.high.y < y - HALF {
                 continue;
             }
-            let (mut low, mut high) = (triangle.low.x - 0.5, triangle.high.x + 0.5);
+            let (mut low, mut high) = (triangle.low.x - HALF, triangle.high.x + HALF);
             for edge in &triangle.edges {
                 // How far the function falls from a texel's centre to its corner.
-                let margin = 0.5 * (edge.along.x.abs() + edge.along.y.abs());
+                let margin = HALF * (edge.along.x.abs() + edge.along.y.abs());
                 if edge.along.y == 0.0 && edge.value(DVec2::new(0.0, y)) < -margin {
                     high = f64::NEG_INFINITY;
                 }
@@ -193,10 +208,10 @@ impl Window {
                 if free[line + column] {
                     let centre = self.centre(row, column);
                     let point = triangle.nearest(centre);
-                    let touch = Touch { chart, distance: point.distance_squared(centre), point };
+                    let distance = point.distance_squared(centre);
                     let best = &mut found[line + column];
-                    if touch.distance < best.distance {
-                        *best = touch;
+                    if distance < best.distance {
+                        *best = Touch { chart, distance, point: triangle.inward(point) };
                     }
                 }
             }

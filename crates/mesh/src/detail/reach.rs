@@ -40,6 +40,7 @@ pub(super) fn measured(
     );
     let (above, below) = heights.reduce(|| (0.0, 0.0), |a, b| (a.0.max(b.0), a.1.max(b.1)));
     let (low, high) = plain.bounds();
-    let least = Vec3::distance(low, high) * LEAST;
+    let size = Vec3::distance(low, high);
+    let least = LEAST * if size > 0.0 { size } else { 1.0 };
     Some(((above * MORE).max(least), (below * MORE).max(least)))
 }

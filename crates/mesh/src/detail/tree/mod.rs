@@ -12,6 +12,9 @@
 //! Measured on 524 288 triangles and 1024 x 1024 rays, processor time: this tree 0.05 s to build and
 //! 0.07 s to ask; `obvhs` 0.4 between 0.11 + 1.0 s (fastest build) and 0.34 + 0.33 s.
 
+// Loops over lanes walk several arrays at once; written with an index they become vector code.
+#![allow(clippy::needless_range_loop)]
+
 mod beam;
 mod build;
 mod leaf;

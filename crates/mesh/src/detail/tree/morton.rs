@@ -111,7 +111,7 @@ mod tests {
     fn the_order_is_that_of_a_comparison_sort() {
         let point = |i: usize| {
             let x = |k: u32| (i as u32).wrapping_mul(2_654_435_761).rotate_left(k) as f32 / 4e9;
-            [x(0), x(9), if i % 3 == 0 { 0.5 } else { x(20) }]
+            [x(0), x(9), if i.is_multiple_of(3) { 0.5 } else { x(20) }]
         };
         let found = order(5000, |i| EMPTY.with(point(i)));
         let around = (0..5000).fold(EMPTY, |b, i| b.with(point(i)));
