@@ -11,7 +11,7 @@ use heightfield::{HeightField, Technique};
 use rayon::ThreadPoolBuilder;
 
 use crate::scene::{self, ELEVATIONS, Map, Order};
-use crate::{run, short};
+use crate::{run, searches, short};
 
 /// Rays counted; as they come in a picture, so that packets are as full as they get.
 const RAYS: usize = 2048;
@@ -21,20 +21,13 @@ pub const FLAG: &str = "--count-instructions";
 /// The function that is counted, as callgrind names it.
 const COUNTED: &str = concat!(module_path!(), "::counted_march");
 
-/// What the child marches, in the order in which it does.
-fn marches() -> impl Iterator<Item = (f64, Technique)> {
-    ELEVATIONS.into_iter().flat_map(|elevation| {
-        Technique::all().iter().map(move |info| (elevation, Technique::named(info.name).unwrap()))
-    })
-}
-
 /// Callgrind counts nothing but this, and writes its count on the way out.
 #[inline(never)]
 fn counted_march(field: &HeightField, technique: &Technique, rays: &compare::Rays) {
     black_box(run(field, technique, rays));
 }
 
-/// The child: `FLAG map side texels`, the last a file of `f32`.
+/// The child: `FLAG map side texels`, the last a file of `f32`. It says what it marched, line by line.
 pub fn child(arguments: &[String]) {
     let [_, side, path] = arguments else {
         panic!("{FLAG} needs a map, a side and a file, got {arguments:?}")
@@ -47,11 +40,15 @@ pub fn child(arguments: &[String]) {
     let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     pool.install(|| {
         let field = scene::field(&texels, side);
-        for (elevation, technique) in marches() {
+        let (techniques, _) = searches(&field);
+        for elevation in ELEVATIONS {
             let rays = Order::Image.rays(&field, elevation, RAYS);
-            // Once before, so that nothing is built or loaded in the counted one.
-            run(&field, &technique, &rays);
-            counted_march(&field, &technique, &rays);
+            for technique in &techniques {
+                // Once before, so that nothing is built or loaded in the counted one.
+                run(&field, technique, &rays);
+                counted_march(&field, technique, &rays);
+                println!("{elevation}\t{}", short(technique));
+            }
         }
     });
 }
@@ -86,14 +83,18 @@ fn count_in(folder: &Path, map: Map, texels: &[f32], side: usize) -> Result<Vec<
         let said = String::from_utf8_lossy(&output.stderr);
         return Err(format!("valgrind failed: {}", said.lines().last().unwrap_or_default()));
     }
-    marches()
+    let marched = String::from_utf8_lossy(&output.stdout);
+    marched
+        .lines()
         .enumerate()
-        .map(|(at, (elevation, technique))| {
+        .map(|(at, line)| {
             let path = folder.join(format!("out.{}", at + 1));
             let text = std::fs::read_to_string(&path).map_err(|_| "callgrind wrote no counts".to_owned())?;
             let total = text.lines().find_map(|line| line.strip_prefix("totals: "));
             let total: f64 = total.and_then(|n| n.trim().parse().ok()).ok_or("callgrind wrote no total")?;
-            Ok((elevation, short(&technique), total / RAYS as f64))
+            let (elevation, technique) = line.split_once('\t').ok_or("the child said nothing sensible")?;
+            let elevation = elevation.parse().map_err(|_| "the child said no elevation".to_owned())?;
+            Ok((elevation, technique.to_owned(), total / RAYS as f64))
         })
         .collect()
 }

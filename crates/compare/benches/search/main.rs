@@ -40,6 +40,22 @@ fn march_for(field: &HeightField, technique: &Technique, rays: &Rays, outputs: O
     march(field, technique, origins, directions, &options).unwrap()
 }
 
+/// Every technique that can search this field with default parameters, and why the others cannot.
+fn searches(field: &HeightField) -> (Vec<Technique>, Vec<String>) {
+    let ray = Order::Random.rays(field, 45.0, 1);
+    let all = Technique::all().iter().map(|info| Technique::named(info.name).unwrap());
+    let tried = all.map(|technique| {
+        let options = MarchOptions { outputs: OutputSet::T, ..MarchOptions::default() };
+        let (origins, directions) = (RayArray::F32(&ray.origins), RayArray::F32(&ray.directions));
+        match march(field, &technique, origins, directions, &options) {
+            Ok(_) => Ok(technique),
+            Err(error) => Err(format!("{}: left out: {error}", technique.info.name)),
+        }
+    });
+    let (able, unable): (Vec<_>, Vec<_>) = tried.partition(Result::is_ok);
+    (able.into_iter().flatten().collect(), unable.into_iter().filter_map(Result::err).collect())
+}
+
 /// A technique with the values of its parameters: `relief(32, 8)`.
 fn short(technique: &Technique) -> String {
     let values: Vec<String> = technique.settings().map(|(_, value)| value.to_string()).collect();
@@ -127,6 +143,8 @@ fn measure(
     });
     drop(texels);
     let all = pool(0);
+    let (techniques, unable) = searches(&field);
+    notes.extend(unable.into_iter().filter(|why| !notes.contains(why)).collect::<Vec<_>>());
     for &elevation in elevations {
         eprintln!("{map} {side} x {side}, {elevation} degrees");
         let measured = Order::Random.rays(&field, elevation, MEASURED);
@@ -135,20 +153,19 @@ fn measure(
             control(&field, &measured, &reference);
         }
         let timed = ORDERS.map(|order| order.rays(&field, elevation, RAYS));
-        for info in Technique::all() {
-            let technique = Technique::named(info.name).unwrap();
+        for technique in &techniques {
             let times = std::array::from_fn(|at| {
                 let group = format!("{map}/{side}/{elevation}/{}", ORDERS[at]);
-                time(criterion, [&group, &technique.to_string()], &all, (&field, &technique, &timed[at]))
+                time(criterion, [&group, &technique.to_string()], &all, (&field, technique, &timed[at]))
             });
             let [random_ns, image_ns]: [Option<f64>; 2] = times;
             if random_ns.is_none() && image_ns.is_none() {
                 continue;
             }
-            let key = Key { map, side, elevation, technique: short(&technique) };
+            let key = Key { map, side, elevation, technique: short(technique) };
             let instructions =
                 counts.iter().find(|(e, name, _)| (*e, name) == (elevation, &key.technique)).map(|c| c.2);
-            let error = errors(&field, &technique, &measured, &reference, |_| ());
+            let error = errors(&field, technique, &measured, &reference, |_| ());
             rows.push(Row { key, random_ns, image_ns, error, instructions });
         }
     }
@@ -164,18 +181,17 @@ fn scaling(criterion: &mut Criterion) -> String {
     let mut text = format!("{:<26}", "Mrays/s by threads");
     threads.iter().for_each(|n| text.push_str(&format!(" {n:>8}")));
     text.push('\n');
-    for info in Technique::all() {
-        let technique = Technique::named(info.name).unwrap();
+    for technique in &searches(&field).0 {
         let rates: Vec<_> = threads
             .iter()
             .filter_map(|&n| {
                 let group = format!("threads/{n}");
-                time(criterion, [&group, &technique.to_string()], &pool(n), (&field, &technique, &rays))
+                time(criterion, [&group, &technique.to_string()], &pool(n), (&field, technique, &rays))
             })
             .map(|ns| format!(" {:>8.2}", 1e3 / ns))
             .collect();
         if !rates.is_empty() {
-            text.push_str(&format!("{:<26}{}\n", short(&technique), rates.concat()));
+            text.push_str(&format!("{:<26}{}\n", short(technique), rates.concat()));
         }
     }
     text
