@@ -28,7 +28,7 @@ def requirements(script: Path) -> list[str]:
 def prepare(script: Path) -> Path:
     """The interpreter of the script's environment; built when it or its requirements are new.
 
-    Raises RuntimeError with pip's last words.
+    Raises RuntimeError with pip's last error.
     """
     folder = ENVIRONMENTS / script.stem
     python = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
@@ -42,8 +42,8 @@ def prepare(script: Path) -> Path:
     if needed:
         installed = subprocess.run(command, capture_output=True, text=True, check=False)
         if installed.returncode:
-            lines = (installed.stderr or installed.stdout).strip().splitlines()
-            raise RuntimeError(lines[-1] if lines else f"pip ended with {installed.returncode}")
+            errors = [line for line in installed.stderr.splitlines() if line.startswith("ERROR")]
+            raise RuntimeError(errors[-1] if errors else f"pip ended with {installed.returncode}")
     done.write_text("\n".join(needed))
     return python
 

@@ -78,3 +78,14 @@ pub fn maps(wrap: Wrap) -> Vec<Map> {
         map("two", 2, 3, wrap, noise(5)),
     ]
 }
+
+/// Pyramids of more levels; they take the judge longer.
+pub fn large_maps(wrap: Wrap) -> Vec<Map> {
+    let mut random = Random(6);
+    let mut noise = move |_: usize, _: usize| random.next() as f32;
+    vec![
+        map("fractal", 512, 512, wrap, fractal(512, 512, 8)),
+        map("spikes", 333, 257, wrap, |i, j| if i % 67 == 4 && j % 59 == 3 { 1.0 } else { 0.0 }),
+        map("row", 1000, 1, wrap, &mut noise),
+    ]
+}
