@@ -36,6 +36,7 @@ SIGNATURES = {
     "march_stream": "height_map chunks technique * outputs from_surface overlap",
     "bake": "source maps * progress **options",
     "Maps.save": "self folder * format bits prefix",
+    "HorizonShadows": "azimuths softness",
     "Mesh": "positions indices uvs * normals tangents",
     "Mesh.open": "path",
     "Mesh.tangents": "self method",

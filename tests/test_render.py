@@ -172,6 +172,40 @@ def test_shadows_darken() -> None:
 
 
 @pytest.mark.gpu
+def test_shadows_from_a_horizon_map() -> None:
+    low_sun = [bw.Light.directional((1, 0.3, -0.5))]
+    rays, looked_up, soft, none = (
+        render("relief", material=bricks(), lights=low_sun, shadows=shadows, aovs=("shadow",))
+        for shadows in (True, "horizon", bw.HorizonShadows(azimuths=64, softness=20.0), False)
+    )
+    assert looked_up.stats["shadow_rays"] == 0 < rays.stats["shadow_rays"]
+    same = ((looked_up.aovs["shadow"] > 0.5) == (rays.aovs["shadow"] > 0.5)).mean()
+    assert same > 0.95
+    # Negative control: no shadow at all is not as close.
+    assert ((none.aovs["shadow"] > 0.5) == (rays.aovs["shadow"] > 0.5)).mean() < same - 0.05
+    partly = (soft.aovs["shadow"] > 0.01) & (soft.aovs["shadow"] < 0.99)
+    assert partly.mean() > 0.05
+    hard = (looked_up.aovs["shadow"] > 0.01) & (looked_up.aovs["shadow"] < 0.99)
+    assert not hard.any()
+    # Techniques without a search get shadows too; those without a relief say that they do not.
+    bump = render("bump", material=bricks(), lights=low_sun, shadows="horizon", aovs=("shadow",))
+    assert bump.warnings == () and bump.aovs["shadow"].max() == 1
+    with pytest.warns(bw.BumpWarning, match="horizon"):
+        render("flat", material=bricks(), shadows="horizon")
+
+
+def test_horizon_shadows_are_checked() -> None:
+    assert bw.HorizonShadows() == bw.HorizonShadows(azimuths=32, softness=0.0)
+    for wrong in ({"azimuths": 3}, {"azimuths": 257}, {"softness": -1.0}, {"softness": float("nan")}):
+        with pytest.raises(ValueError, match=next(iter(wrong))):
+            bw.HorizonShadows(**wrong)
+    with pytest.raises(TypeError, match="azimuths"):
+        bw.HorizonShadows(azimuths=8.5)
+    with pytest.raises(TypeError, match="horizon"):
+        bw.render(bw.Mesh.quad(), shadows="soft")
+
+
+@pytest.mark.gpu
 def test_the_same_twice_and_other_materials_differ() -> None:
     one, two = (render("relief", material=bricks(), camera=LOW) for _ in range(2))
     np.testing.assert_array_equal(one.color, two.color)

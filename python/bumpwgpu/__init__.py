@@ -19,7 +19,7 @@ from .frames import Tangents, tangents
 from .heightmap import HeightMap
 from .marching import Hits, march
 from .meshes import Mesh, MeshMaterial, Part
-from .rendering import Frame, render
+from .rendering import Frame, HorizonShadows, render
 from .scene import Camera, Light, Material
 from .streaming import march_stream
 from .system import info
@@ -38,6 +38,7 @@ __all__ = [
     "Frame",
     "HeightMap",
     "Hits",
+    "HorizonShadows",
     "Light",
     "Maps",
     "Material",

@@ -244,6 +244,7 @@ def render(
     parameters: _Parameters,
     size: tuple[int, int],
     shadows: bool | None,
+    horizon: tuple[int, float] | None,
     aovs: Sequence[str],
 ) -> _RenderResult: ...
 def save_map(

@@ -5,16 +5,17 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _bumpwgpu
 from ._atomic import replace_file
-from ._checks import choice, flag, numbers, strings, width_and_height
+from ._checks import choice, flag, number, numbers, strings, whole, width_and_height
 from .errors import BumpWarning, RenderError
 from .meshes import Mesh
 from .scene import Camera, Light, Material
@@ -23,7 +24,7 @@ from .techniques import Technique, get
 if TYPE_CHECKING:
     from PIL import Image
 
-__all__ = ["AOVS", "Frame", "render"]
+__all__ = ["AOVS", "Frame", "HorizonShadows", "render"]
 
 #: Additional outputs.
 AOVS: tuple[str, ...] = (
@@ -42,6 +43,38 @@ AOVS: tuple[str, ...] = (
 MAX_SIDE = 1 << 16
 
 _DEFAULT_LIGHTS = (Light.directional((-0.6, -0.7, -0.9)),)
+
+
+@dataclass(frozen=True)
+class HorizonShadows:
+    """Self-shadows looked up in a horizon map, without a ray (Max 1988): what `shadows` of `render` takes.
+
+    The map is baked from the material's heights when it is first needed and kept with them. It stands
+    for the relief on a plane: on a curved mesh each point takes its tangent plane for the whole mesh.
+    It does not tell what stands behind a point light from what stands before it, and what is narrower
+    than a texel or lies between two azimuths is interpolated.
+
+    Attributes
+    ----------
+    azimuths : int, default 32
+        Directions in which the horizon is known, 4 to 256. The map takes 2 bytes for each of them and
+        texel.
+    softness : float, default 0.0
+        Width of every light as an angle in degrees, 0 to 90; 0 gives hard edges. The sun has 0.5.
+
+    Examples
+    --------
+    >>> import bumpwgpu as bw
+    >>> bw.HorizonShadows(softness=5.0)
+    HorizonShadows(azimuths=32, softness=5.0)
+    """
+
+    azimuths: int = 32
+    softness: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "azimuths", whole("azimuths", self.azimuths, 4, 256))
+        object.__setattr__(self, "softness", number("softness", self.softness, 0.0, 90.0))
 
 
 class Frame:
@@ -166,7 +199,7 @@ def render(
     lights: Iterable[Light] | None = None,
     technique: str | Technique = "relief",
     size: int | tuple[int, int] = (512, 512),
-    shadows: bool | None = None,
+    shadows: bool | Literal["horizon"] | HorizonShadows | None = None,
     aovs: str | Iterable[str] = (),
     device: str = "auto",
     ambient: float | tuple[float, float, float] = 0.1,
@@ -188,8 +221,10 @@ def render(
         One of :func:`bumpwgpu.techniques.names`.
     size : int or (int, int), default (512, 512)
         Pixels: the side of a square, or (width, height).
-    shadows : bool or None
-        Whether the relief shadows itself. None: where the technique can.
+    shadows : bool, "horizon", HorizonShadows or None
+        Whether the relief shadows itself, by the technique's own search towards each light. None:
+        where the technique can. "horizon" looks shadows up in a baked horizon map instead, also for
+        "bump" and "normal", which cast none; :class:`HorizonShadows` chooses its size and softness.
     aovs : str or iterable of str
         Additional outputs, (H, W) or (H, W, C): "uv" (unwrapped), "depth" (along the view axis, mesh
         units, inf where nothing is), "position", "normal" (world axes), "height" (0..1), "steps",
@@ -252,7 +287,7 @@ def render(
         chosen.name,
         list(chosen.parameters.items()),
         (width, height),
-        None if shadows is None else flag("shadows", shadows),
+        *_shadows(shadows),
         outputs,
     )
     texts = list(result["warnings"])
@@ -261,6 +296,22 @@ def render(
     for text in texts:
         warnings.warn(text, BumpWarning, stacklevel=2)
     return Frame(result["color"], result["aovs"], result["stats"], tuple(texts))
+
+
+def _shadows(shadows: Any) -> tuple[bool | None, tuple[int, float] | None]:
+    """Whether there are shadows, and the azimuths and softness (radians) of a horizon map."""
+    if isinstance(shadows, str) and shadows == "horizon":
+        shadows = HorizonShadows()
+    if isinstance(shadows, HorizonShadows):
+        return True, (shadows.azimuths, float(np.radians(shadows.softness)))
+    if shadows is None:
+        return None, None
+    try:
+        return flag("shadows", shadows), None
+    except TypeError:
+        raise TypeError(
+            f"shadows must be True, False, None, 'horizon' or HorizonShadows, got {shadows!r}"
+        ) from None
 
 
 def _size(size: Any) -> tuple[int, int]:

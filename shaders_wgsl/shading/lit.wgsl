@@ -7,7 +7,7 @@
 
 struct Lit {
     color: vec3f,          // linear
-    shadow_rays: u32,      // lights tested
+    shadow_rays: u32,      // rays sent to lights
     blocked: f32,          // share of the lights facing the point that the relief hides
 }
 
@@ -17,7 +17,7 @@ fn lit(albedo: vec3f, position: vec3f, normal: vec3f, point: ShadowPoint) -> Lit
     var result: Lit;
     result.color = albedo * frame.ambient.rgb;
     var facing = 0u;
-    var blocked = 0u;
+    var blocked = 0.0;
     for (var i = 0u; i < frame.light_count; i++) {
         let light = lights[i];
         let distant = light.place.w == 0.0;
@@ -27,19 +27,21 @@ fn lit(albedo: vec3f, position: vec3f, normal: vec3f, point: ShadowPoint) -> Lit
             continue;
         }
         facing += 1u;
+        var share_hidden = 0.0;
         if tests_shadows() {
             let offset_object = (draw.object_from_relative * vec4f(offset, 0.0)).xyz;
-            result.shadow_rays += 1u;
-            if shadowed(point, offset_object, distant) {
-                blocked += 1u;
+            result.shadow_rays += SHADOW_RAYS;
+            share_hidden = hidden(point, offset_object, distant);
+            blocked += share_hidden;
+            if share_hidden >= 1.0 {
                 continue;
             }
         }
         let falloff = select(1.0 / max(dot(offset, offset), 1e-12), 1.0, distant);
-        result.color += blinn_phong(
+        result.color += (1.0 - share_hidden) * blinn_phong(
             normal, to_light, to_eye, albedo, light.color.rgb * falloff,
             material.specular, material.shininess);
     }
-    result.blocked = f32(blocked) / f32(max(facing, 1u));
+    result.blocked = blocked / f32(max(facing, 1u));
     return result;
 }

@@ -7,5 +7,6 @@
 // `position`: of the mesh surface, object space; `point.uv`: there.
 fn shade_on_mesh(position: vec3f, point: SurfacePoint) -> Targets {
     let albedo = albedo_at(point.uv, point.uv_dx, point.uv_dy);
-    return targets(shade_mesh(position, shading_normal(point), point.uv, albedo));
+    let shadow = shadow_point_on_mesh(point);
+    return targets(shade_mesh(position, shading_normal(point), point.uv, albedo, shadow));
 }

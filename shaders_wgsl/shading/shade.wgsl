@@ -23,15 +23,14 @@ fn displayable(color: vec3f) -> vec4f {
 }
 
 // A point that lies on the mesh. `position`, `normal`: object space.
-fn shade_mesh(position: vec3f, normal: vec3f, uv: vec2f, albedo: vec4f) -> Shaded {
-    var point: ShadowPoint;
+fn shade_mesh(position: vec3f, normal: vec3f, uv: vec2f, albedo: vec4f, point: ShadowPoint) -> Shaded {
     let relative = relative_position(position);
     let light = lit(albedo.rgb, relative, world_normal(normal), point);
     var shaded: Shaded;
     shaded.color = displayable(light.color);
     shaded.trace = pack_trace(TRACE_COVERED, 0u, 0u, 0u);
     shaded.place = vec4f(uv, dot(relative, frame.forward.xyz), material.base);
-    shaded.position = vec4f(relative, 0.0);
+    shaded.position = vec4f(relative, light.blocked);
     shaded.normal = vec4f(world_normal(normal), 0.0);
     return shaded;
 }

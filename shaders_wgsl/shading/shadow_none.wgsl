@@ -1,5 +1,8 @@
 // No self-shadow: techniques that do not search, and entries that do not ask.
 #import "lib/surface_frame.wgsl"
+#import "lib/surface_point.wgsl"
+
+const SHADOW_RAYS: u32 = 0u;
 
 struct ShadowPoint {
     surface: SurfaceFrame,
@@ -10,6 +13,10 @@ fn tests_shadows() -> bool {
     return false;
 }
 
-fn shadowed(point: ShadowPoint, to_light: vec3f, distant: bool) -> bool {
-    return false;
+fn shadow_point_on_mesh(point: SurfacePoint) -> ShadowPoint {
+    return ShadowPoint(point.surface, vec3f(point.uv, 0.0));
+}
+
+fn hidden(point: ShadowPoint, to_light: vec3f, distant: bool) -> f32 {
+    return 0.0;
 }

@@ -2,6 +2,8 @@
 #import "bindings/material.wgsl"
 #import "lib/texture_ray.wgsl"
 
+const SHADOW_RAYS: u32 = 1u;
+
 // Without it no shadow ray is compiled.
 override cast_shadows: bool = true;
 
@@ -14,14 +16,14 @@ fn tests_shadows() -> bool {
     return cast_shadows;
 }
 
-// Whether the relief hides the light. `to_light`: object space, see shadow_ray.
-fn shadowed(point: ShadowPoint, to_light: vec3f, distant: bool) -> bool {
+// The share of the light that the relief hides: all or nothing. `to_light`: object space, see shadow_ray.
+fn hidden(point: ShadowPoint, to_light: vec3f, distant: bool) -> f32 {
     let ray = shadow_ray(point.surface, to_light, distant, point.place.z, material.scale);
     if !ray.above {
-        return true;
+        return 1.0;
     }
     if !(ray.delta.z > 0.0) {
-        return false;
+        return 0.0;
     }
-    return occluded(point.place, ray.delta, ray.cos_theta);
+    return select(0.0, 1.0, occluded(point.place, ray.delta, ray.cos_theta));
 }

@@ -9,6 +9,7 @@
 pub mod error;
 pub mod field;
 pub mod hits;
+pub mod horizon;
 pub mod march;
 pub mod oracle;
 pub mod pyramid;
@@ -21,6 +22,7 @@ pub mod technique;
 pub use error::HeightFieldError;
 pub use field::{Extent, HeightField, Wrap};
 pub use hits::{Hits, HitsMut, OutputSet};
+pub use horizon::HorizonMap;
 pub use march::{MarchOptions, march, march_into};
 pub use pyramid::MaxPyramid;
 pub use ray::{Found, Segment, Status};

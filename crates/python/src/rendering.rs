@@ -9,7 +9,7 @@ use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUnty
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use render::{AovSet, Camera, Draw, Light, Request, Scene, TechniqueChoice};
+use render::{AovSet, Camera, Draw, HorizonShadows, Light, Request, Scene, TechniqueChoice};
 
 use crate::errors::Raise;
 use crate::field::Field;
@@ -81,7 +81,7 @@ fn parse_light((directional, vector, color, intensity): LightArg) -> Light {
 }
 
 /// Renders runs of triangles `(mesh, first, end, material)` into a dict with `color`, `aovs`,
-/// `stats` and `warnings`.
+/// `stats` and `warnings`. `horizon`: azimuths and softness (radians) of shadows from a horizon map.
 #[pyfunction(name = "render")]
 #[expect(clippy::too_many_arguments, reason = "one flat call from the Python facade")]
 pub fn render_scene<'py>(
@@ -95,6 +95,7 @@ pub fn render_scene<'py>(
     parameters: Vec<(String, f64)>,
     size: [u32; 2],
     shadows: Option<bool>,
+    horizon: Option<(u32, f32)>,
     aovs: Vec<String>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let technique = parse_choice(technique, &parameters)?;
@@ -132,7 +133,8 @@ pub fn render_scene<'py>(
             ambient,
             background,
         };
-        let request = Request { shadows, aovs, ..Request::new(technique, size[0], size[1]) };
+        let horizon = horizon.map(|(azimuths, softness)| HorizonShadows { azimuths, softness });
+        let request = Request { shadows, horizon, aovs, ..Request::new(technique, size[0], size[1]) };
         render::render(&device, &scene, &request)
     })?;
     frame_to_dict(py, frame)

@@ -29,6 +29,7 @@ pub struct Layouts {
     /// Group 0 of the march kernel.
     pub march: BindGroupLayout,
     material: [BindGroupLayout; 3],
+    material_with_horizon: [BindGroupLayout; 3],
 }
 
 impl Layouts {
@@ -48,6 +49,11 @@ impl Layouts {
             entry(4, ShaderStages::FRAGMENT, BindingType::Sampler(SamplerBindingType::Filtering)),
             entry(5, ShaderStages::FRAGMENT, texture(true, TextureViewDimension::Cube)),
             entry(6, ShaderStages::FRAGMENT, BindingType::Sampler(SamplerBindingType::Filtering)),
+        ];
+        let horizon = [
+            entry(7, ShaderStages::FRAGMENT, texture(true, TextureViewDimension::D2Array)),
+            entry(8, ShaderStages::FRAGMENT, BindingType::Sampler(SamplerBindingType::Filtering)),
+            entry(9, ShaderStages::FRAGMENT, uniform()),
         ];
         Self {
             frame: make(
@@ -82,12 +88,15 @@ impl Layouts {
                 make("material with a map", &material[..5]),
                 make("material with a map and a cube", &material),
             ],
+            material_with_horizon: [3, 5, 7]
+                .map(|own| make("material with a horizon", &[&material[..own], &horizon].concat())),
         }
     }
 
-    /// The layout of group 2.
-    pub fn material(&self, maps: MaterialMaps) -> &BindGroupLayout {
-        &self.material[match maps {
+    /// The layout of group 2; `horizon`: with a horizon map at bindings 7 to 9.
+    pub fn material(&self, maps: MaterialMaps, horizon: bool) -> &BindGroupLayout {
+        let layouts = if horizon { &self.material_with_horizon } else { &self.material };
+        &layouts[match maps {
             MaterialMaps::None => 0,
             MaterialMaps::Map => 1,
             MaterialMaps::MapAndCube => 2,

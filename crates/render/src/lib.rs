@@ -37,5 +37,5 @@ pub use error::RenderError;
 pub use frame::{Aovs, Frame, Stats};
 pub use march::{DeviceHits, march, occluded};
 pub use render::{render, render_in_bands};
-pub use request::{AovSet, PLAIN_TECHNIQUES, Request, TechniqueChoice};
+pub use request::{AovSet, HorizonShadows, PLAIN_TECHNIQUES, Request, TechniqueChoice};
 pub use scene::{Draw, Light, Material, Scene};

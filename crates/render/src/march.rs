@@ -149,6 +149,7 @@ fn run(
             search: Some(technique.info.name),
             surface: "",
             maps: MaterialMaps::None,
+            horizon: false,
         },
         reads: Some(ReadsKey::from(reads)),
         constants,

@@ -101,7 +101,8 @@ impl Device {
         let program = &key.program;
         let is_kernel = program.entry.starts_with("kernels/");
         let surface = if is_kernel { None } else { Some(program.surface) };
-        let source = shaders::compose(program.entry, program.search, surface)?;
+        let compose = if program.horizon { shaders::compose_with_horizon } else { shaders::compose };
+        let source = compose(program.entry, program.search, surface)?;
         let constants = self.constants(&key);
         let pipeline = self.guard("compiling a pipeline", || {
             let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
@@ -155,7 +156,7 @@ impl Device {
             bind_group_layouts: &[
                 Some(&self.layouts.frame),
                 self.field_layout(key.reads),
-                Some(self.layouts.material(key.program.maps)),
+                Some(self.layouts.material(key.program.maps, key.program.horizon)),
                 Some(&self.layouts.draw),
             ],
             immediate_size: 0,

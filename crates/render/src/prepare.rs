@@ -14,9 +14,11 @@ use crate::pipeline::{Pipeline, PipelineKey, ReadsKey, attributes, constants_of,
 use crate::request::Program;
 use crate::targets::TargetSet;
 use crate::texture;
-use crate::uniforms::{DrawInfo, LightInfo, MaterialInfo, wrap_code};
+use crate::uniforms::{DrawInfo, HorizonInfo, LightInfo, MaterialInfo, wrap_code};
 use crate::uploads::{Kind, Resource};
-use crate::{Device, Draw, Light, Material, RenderError, Request, Scene, Stats, TechniqueChoice};
+use crate::{
+    Device, Draw, HorizonShadows, Light, Material, RenderError, Request, Scene, Stats, TechniqueChoice,
+};
 
 /// One draw, ready.
 pub(crate) struct Prepared {
@@ -53,7 +55,10 @@ pub(crate) fn draws(
         }
         stats.triangles_drawn += count;
 
-        let program = request.technique.program(draw.material.normal.is_some());
+        let mut program = request.technique.program(draw.material.normal.is_some());
+        let horizon =
+            request.horizon.filter(|_| request.shadows != Some(false) && request.technique.takes_horizon());
+        program.horizon = horizon.is_some();
         let locations = attributes(program.entry);
         let geometry = match meshes.get(&(std::ptr::from_ref(draw.mesh), locations)) {
             Some(geometry) => Arc::clone(geometry),
@@ -65,7 +70,7 @@ pub(crate) fn draws(
         };
         let reads = reads_of(&request.technique);
         let field = reads.map(|reads| device.field_group(&draw.material.field, reads)).transpose()?;
-        let material = material_group(device, draw.material, program, stats)?;
+        let material = material_group(device, draw.material, program, horizon, stats)?;
         let before = Instant::now();
         let pipeline = device.pipeline(key(draw, request, program, shadows))?;
         stats.compile_ms += before.elapsed().as_secs_f64() * 1e3;
@@ -86,7 +91,9 @@ fn key(draw: &Draw<'_>, request: &Request, program: Program, shadows: bool) -> P
     let mut constants = Vec::new();
     if let TechniqueChoice::Search(technique) = &request.technique {
         constants = constants_of(technique);
-        constants.push(("cast_shadows", i64::from(shadows)));
+        if !program.horizon {
+            constants.push(("cast_shadows", i64::from(shadows)));
+        }
     }
     PipelineKey {
         program,
@@ -143,6 +150,7 @@ fn material_group(
     device: &Device,
     material: &Material,
     program: Program,
+    horizon: Option<HorizonShadows>,
     stats: &mut Stats,
 ) -> Result<wgpu::BindGroup, RenderError> {
     let field = &material.field;
@@ -202,13 +210,44 @@ fn material_group(
         entries.push(bind(5, wgpu::BindingResource::TextureView(cube)));
         entries.push(bind(6, wgpu::BindingResource::Sampler(&cube_sampler)));
     }
+    let horizon = horizon.map(|horizon| HorizonBinding::new(device, material, horizon, stats)).transpose()?;
+    if let Some(horizon) = &horizon {
+        entries.push(bind(7, wgpu::BindingResource::TextureView(&horizon.map)));
+        entries.push(bind(8, wgpu::BindingResource::Sampler(&sampler)));
+        entries.push(bind(9, horizon.info.as_entire_binding()));
+    }
     device.guard("binding a material", || {
         Ok(device.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("material"),
-            layout: device.layouts.material(program.maps),
+            layout: device.layouts.material(program.maps, program.horizon),
             entries: &entries,
         }))
     })
+}
+
+/// What shading/shadow_horizon binds.
+struct HorizonBinding {
+    map: wgpu::TextureView,
+    info: wgpu::Buffer,
+}
+
+impl HorizonBinding {
+    fn new(
+        device: &Device,
+        material: &Material,
+        horizon: HorizonShadows,
+        stats: &mut Stats,
+    ) -> Result<Self, RenderError> {
+        let field = &material.field;
+        let HorizonShadows { azimuths, softness } = horizon;
+        let (map, made) = view(device.keep(field, Kind::Horizon(azimuths), || {
+            texture::horizon(device, field, azimuths).map(Resource::View)
+        })?)?;
+        stats.maps_baked += u32::from(made);
+        let info = HorizonInfo { tile_size: field.extent().tile_size, softness: softness.max(0.0), azimuths };
+        let info = device.buffer_with("horizon", bytemuck::bytes_of(&info), wgpu::BufferUsages::UNIFORM)?;
+        Ok(Self { map, info })
+    }
 }
 
 /// The map at binding 3, baked if the device does not have it.

@@ -99,7 +99,10 @@ pub fn render_in_bands(
 fn warnings(scene: &Scene<'_>, request: &Request) -> Vec<String> {
     let mut warnings = Vec::new();
     let name = request.technique.name();
-    if request.shadows == Some(true) && !request.technique.casts_shadows() {
+    if request.horizon.is_some() && !request.technique.takes_horizon() {
+        warnings.push(format!("technique {name:?} takes no horizon map; horizon shadows have no effect"));
+    } else if request.shadows == Some(true) && request.horizon.is_none() && !request.technique.casts_shadows()
+    {
         warnings.push(format!("technique {name:?} casts no shadows; shadows=True has no effect"));
     }
     if request.technique == TechniqueChoice::Dot3 {

@@ -72,6 +72,11 @@ impl TechniqueChoice {
         matches!(self, Self::Search(technique) if technique.info.casts_shadows)
     }
 
+    /// Whether a horizon map can shadow it: it has a relief and more than one fixed-function light.
+    pub fn takes_horizon(&self) -> bool {
+        !matches!(self, Self::Flat | Self::Dot3)
+    }
+
     /// The shader files it is made of. `own_normals`: the material has a normal map.
     pub(crate) fn program(&self, own_normals: bool) -> Program {
         let (entry, surface, maps) = match (self, own_normals) {
@@ -84,7 +89,7 @@ impl TechniqueChoice {
             (Self::Search(_), true) => ("relief_mapped", "tangent", MaterialMaps::Map),
         };
         let search = if let Self::Search(technique) = self { Some(technique.info.name) } else { None };
-        Program { entry, search, surface, maps }
+        Program { entry, search, surface, maps, horizon: false }
     }
 }
 
@@ -95,6 +100,8 @@ pub(crate) struct Program {
     pub search: Option<&'static str>,
     pub surface: &'static str,
     pub maps: MaterialMaps,
+    /// Whether shadows come from a horizon map.
+    pub horizon: bool,
 }
 
 /// A set of additional outputs.
@@ -170,6 +177,21 @@ impl std::ops::BitOrAssign for AovSet {
     }
 }
 
+/// Self-shadows looked up in a horizon map that is baked for the purpose (Max 1988).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HorizonShadows {
+    /// Azimuths of the map, at most what the device has texture layers (256 or more).
+    pub azimuths: u32,
+    /// Width of every light as an angle in radians; 0 gives hard edges.
+    pub softness: f32,
+}
+
+impl Default for HorizonShadows {
+    fn default() -> Self {
+        Self { azimuths: 32, softness: 0.0 }
+    }
+}
+
 /// How to render.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Request {
@@ -182,6 +204,8 @@ pub struct Request {
     /// Self-shadows: where the technique can (`None`), or as said; `Some(true)` on a technique that
     /// cannot is a warning.
     pub shadows: Option<bool>,
+    /// Self-shadows from a horizon map in place of rays, also for techniques that cast none.
+    pub horizon: Option<HorizonShadows>,
     /// Additional outputs.
     pub aovs: AovSet,
 }
@@ -189,6 +213,6 @@ pub struct Request {
 impl Request {
     /// A picture with no further outputs.
     pub fn new(technique: TechniqueChoice, width: u32, height: u32) -> Self {
-        Self { technique, width, height, shadows: None, aovs: AovSet::NONE }
+        Self { technique, width, height, shadows: None, horizon: None, aovs: AovSet::NONE }
     }
 }

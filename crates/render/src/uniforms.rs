@@ -69,6 +69,18 @@ pub struct MaterialInfo {
     pub wrap: u32,
 }
 
+/// Twin of `HorizonInfo` in `shaders_wgsl/bindings/horizon.wgsl`.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub struct HorizonInfo {
+    /// Mesh units of one tile, as the map was baked.
+    pub tile_size: [f32; 2],
+    /// Width of lights, radians.
+    pub softness: f32,
+    /// Layers of the map.
+    pub azimuths: u32,
+}
+
 /// Levels that [`HeightInfo`] has room for; enough for the longest side twice (mirrored).
 pub const MAX_LEVELS: usize = 18;
 

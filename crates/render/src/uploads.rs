@@ -21,6 +21,8 @@ pub(crate) enum Kind {
     Slopes,
     /// 8-bit normal map baked from heights.
     Baked8Bit,
+    /// Horizon map of so many azimuths.
+    Horizon(u32),
     /// Colour map.
     Albedo,
     /// The material's own normal map.

@@ -4,7 +4,9 @@
 
 use std::mem::offset_of;
 
-use render::uniforms::{DrawInfo, FrameInfo, HeightInfo, LightInfo, MarchResult, MarchSegment, MaterialInfo};
+use render::uniforms::{
+    DrawInfo, FrameInfo, HeightInfo, HorizonInfo, LightInfo, MarchResult, MarchSegment, MaterialInfo,
+};
 use shaders::{Field, Layout};
 
 macro_rules! layout {
@@ -50,6 +52,8 @@ fn host_structs_match() {
         &relief,
         "HeightInfo",
     );
+    let horizon = shaders::compose_with_horizon("sloped", None, Some("bump")).unwrap();
+    check(layout!(HorizonInfo: tile_size, softness, azimuths), &horizon, "HorizonInfo");
     let march = shaders::compose("kernels/march", Some("exact"), None).unwrap();
     check(layout!(MarchSegment: start, cos_theta, delta, unused), &march, "MarchSegment");
     check(layout!(MarchResult: tau, status, steps, unused), &march, "MarchResult");

@@ -4,6 +4,9 @@ use thiserror::Error;
 
 static FILES: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/files.rs"));
 
+/// What stands in for the other ways to find shadows.
+const HORIZON_SHADOWS: &str = "shading/shadow_horizon.wgsl";
+
 /// A program that cannot be put together.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
@@ -44,6 +47,10 @@ pub fn read(path: &str) -> Option<&'static str> {
 /// # Errors
 /// [`ComposeError`] when a file is missing or an import malformed.
 pub fn compose(entry: &str, search: Option<&str>, surface: Option<&str>) -> Result<String, ComposeError> {
+    compose_paths(program_paths(entry, search, surface).iter().map(String::as_str))
+}
+
+fn program_paths(entry: &str, search: Option<&str>, surface: Option<&str>) -> Vec<String> {
     let mut paths = Vec::new();
     paths.extend(search.map(|name| format!("search/{name}.wgsl")));
     paths.extend(surface.map(|name| format!("surface/{name}.wgsl")));
@@ -52,7 +59,7 @@ pub fn compose(entry: &str, search: Option<&str>, surface: Option<&str>) -> Resu
     } else {
         format!("entry/{entry}.wgsl")
     });
-    compose_paths(paths.iter().map(String::as_str))
+    paths
 }
 
 /// The program made of the given files and of all that they import.
@@ -60,7 +67,28 @@ pub fn compose(entry: &str, search: Option<&str>, surface: Option<&str>) -> Resu
 /// # Errors
 /// As [`compose`].
 pub fn compose_paths<'a>(paths: impl IntoIterator<Item = &'a str>) -> Result<String, ComposeError> {
-    let mut stitcher = Stitcher { included: Vec::new(), source: String::new() };
+    stitch(paths, &[])
+}
+
+/// As [`compose`], with shadows from a horizon map: `shading/shadow_horizon.wgsl` stands in for whatever
+/// `shading/shadow_*.wgsl` the entry asks for.
+///
+/// # Errors
+/// As [`compose`].
+pub fn compose_with_horizon(
+    entry: &str,
+    search: Option<&str>,
+    surface: Option<&str>,
+) -> Result<String, ComposeError> {
+    let paths = program_paths(entry, search, surface);
+    stitch(paths.iter().map(String::as_str), &["shading/shadow_none.wgsl", "shading/shadow_search.wgsl"])
+}
+
+fn stitch<'a>(
+    paths: impl IntoIterator<Item = &'a str>,
+    replaced: &'static [&'static str],
+) -> Result<String, ComposeError> {
+    let mut stitcher = Stitcher { included: Vec::new(), source: String::new(), replaced };
     for path in paths {
         stitcher.include(path, "the program")?;
     }
@@ -70,10 +98,13 @@ pub fn compose_paths<'a>(paths: impl IntoIterator<Item = &'a str>) -> Result<Str
 struct Stitcher {
     included: Vec<String>,
     source: String,
+    /// Files for which [`HORIZON_SHADOWS`] stands in.
+    replaced: &'static [&'static str],
 }
 
 impl Stitcher {
     fn include(&mut self, path: &str, from: &str) -> Result<(), ComposeError> {
+        let path = if self.replaced.contains(&path) { HORIZON_SHADOWS } else { path };
         if self.included.iter().any(|known| known == path) {
             return Ok(());
         }

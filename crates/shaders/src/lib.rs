@@ -17,5 +17,5 @@
 pub mod compose;
 pub mod reflect;
 
-pub use compose::{ComposeError, compose, compose_paths, files, read};
+pub use compose::{ComposeError, compose, compose_paths, compose_with_horizon, files, read};
 pub use reflect::{Field, Layout, ReflectError, layout_of, validate};

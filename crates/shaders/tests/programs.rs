@@ -30,7 +30,11 @@ fn programs() -> Vec<(String, String)> {
         for search in &searches {
             for surface in &surfaces {
                 let name = format!("{entry} + {search:?} + {surface:?}");
-                programs.push((name, shaders::compose(entry, *search, *surface).unwrap()));
+                programs.push((name.clone(), shaders::compose(entry, *search, *surface).unwrap()));
+                if !["plain", "dot3", "kernels/march"].contains(entry) {
+                    let program = shaders::compose_with_horizon(entry, *search, *surface).unwrap();
+                    programs.push((name + " + horizon", program));
+                }
             }
         }
     }

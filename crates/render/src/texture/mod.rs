@@ -2,6 +2,7 @@
 
 mod albedo;
 mod cube;
+mod horizon;
 mod mips;
 mod normals;
 mod slopes;
@@ -9,6 +10,7 @@ mod upload;
 
 pub(crate) use albedo::{albedo, white};
 pub(crate) use cube::normalization_cube;
+pub(crate) use horizon::horizon;
 pub(crate) use normals::{baked_8_bit, own, own_8_bit};
 pub(crate) use slopes::slopes;
 pub(crate) use upload::{MipLevel, sampler, upload};
