@@ -118,8 +118,9 @@ fn judge_shadow(
     if !near {
         return Verdict::False;
     }
-    // A hit at the very start is one only for a ray that goes into the surface.
-    if t <= 0.0 && surface.rise(origin, direction) > 1e-6 * speed {
+    // A hit at the very start is one only for a ray that goes into the surface, if only into the last
+    // bit of the cell that it starts in.
+    if t <= 0.0 && deep * speed > 1e-6 && surface.rise(origin, direction) > 1e-6 * speed {
         return Verdict::False;
     }
     Verdict::Right

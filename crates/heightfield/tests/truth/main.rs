@@ -223,3 +223,16 @@ fn the_walk_of_the_judge_agrees_with_bisection() {
         }
     }
 }
+
+#[test]
+fn a_dive_in_the_last_bit_of_a_cell_is_a_shadow() {
+    // Found by night: the ray goes down for 3e-9 of a cell, then leaves the cell and rises.
+    let map = maps(Wrap::Clamp).into_iter().find(|map| map.name.starts_with("noise 61x47")).unwrap();
+    let origin = [1.539_085_507_392_883_3, 0.244_680_851_697_921_75, 0.690_437_018_871_307_4];
+    let direction = [0.968_479_752_540_588_4, -0.249_092_340_469_360_35, 4.518_294_334_411_621];
+    let batch = Batch { kind: Kind::Shadow, single: true, rays: vec![(origin, direction)] };
+    let tally = batch.judge(&map, &batch.answers(&map, &exact()));
+    assert_eq!(tally.count(Verdict::Right), 1, "{tally}");
+    let late = [Answer { status: 0, t: 0.01 }];
+    assert_eq!(batch.judge(&map, &late).count(Verdict::Right), 0);
+}
