@@ -2,6 +2,7 @@
 
 use std::sync::OnceLock;
 
+use crate::margin::Margins;
 use crate::{HeightFieldError, MaxPyramid, SkipPyramid};
 
 /// Longest accepted side, in texels. Cell ids and their sums stay exact in `f32` up to here.
@@ -103,6 +104,7 @@ pub struct HeightField {
     extent: Extent,
     pyramid: OnceLock<MaxPyramid>,
     skip_pyramid: OnceLock<SkipPyramid>,
+    margins: OnceLock<Margins>,
 }
 
 impl HeightField {
@@ -145,6 +147,7 @@ impl HeightField {
             extent: Extent::default(),
             pyramid: OnceLock::new(),
             skip_pyramid: OnceLock::new(),
+            margins: OnceLock::new(),
         })
     }
 
@@ -312,6 +315,11 @@ impl HeightField {
     /// The max pyramid over the cells, built when first asked for.
     pub fn pyramid(&self) -> &MaxPyramid {
         self.pyramid.get_or_init(|| MaxPyramid::build(self))
+    }
+
+    /// Max pyramids with margins of several widths, built when first asked for.
+    pub fn margins(&self) -> &Margins {
+        self.margins.get_or_init(|| Margins::build(self))
     }
 
     /// The max pyramid with a margin around its nodes, built when first asked for.

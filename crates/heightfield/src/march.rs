@@ -4,9 +4,12 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
+use crate::lanes;
+use crate::packet;
 use crate::rays::{fault_of, first_unsound, same_count};
 use crate::search::Search;
 use crate::search::exact::{self, CellRay};
+use crate::technique::Reads;
 use crate::{HeightField, HeightFieldError, Hits, HitsMut, OutputSet, RayArray, Segment};
 use crate::{Status, Technique, Wrap};
 
@@ -36,27 +39,34 @@ impl Default for MarchOptions<'_> {
 
 /// A run of rays and the places their results go.
 pub struct Chunk<'a> {
-    origins: RayArray<'a>,
-    directions: RayArray<'a>,
-    from_surface: bool,
-    cancel: Option<&'a AtomicBool>,
-    t: Option<&'a mut [f32]>,
-    uv: Option<&'a mut [f32]>,
-    z: Option<&'a mut [f32]>,
-    normal: Option<&'a mut [f32]>,
-    steps: Option<&'a mut [u32]>,
-    status: Option<&'a mut [u8]>,
+    pub(crate) origins: RayArray<'a>,
+    pub(crate) directions: RayArray<'a>,
+    pub(crate) from_surface: bool,
+    pub(crate) cancel: Option<&'a AtomicBool>,
+    pub(crate) t: Option<&'a mut [f32]>,
+    pub(crate) uv: Option<&'a mut [f32]>,
+    pub(crate) z: Option<&'a mut [f32]>,
+    pub(crate) normal: Option<&'a mut [f32]>,
+    pub(crate) steps: Option<&'a mut [u32]>,
+    pub(crate) status: Option<&'a mut [u8]>,
 }
 
 impl Chunk<'_> {
     /// Whether the caller asked to stop. A ray may take milliseconds, so each asks anew.
     #[inline(always)]
-    fn cancelled(&self) -> bool {
+    pub(crate) fn cancelled(&self) -> bool {
         self.cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed))
     }
 
     #[inline(always)]
-    fn write(&mut self, i: usize, status: Status, t: f64, steps: u32, gradient: impl FnOnce() -> [f64; 2]) {
+    pub(crate) fn write(
+        &mut self,
+        i: usize,
+        status: Status,
+        t: f64,
+        steps: u32,
+        gradient: impl FnOnce() -> [f64; 2],
+    ) {
         let hit = status == Status::Hit;
         if let Some(out) = &mut self.t {
             out[i] = if hit { t as f32 } else { f32::INFINITY };
@@ -152,19 +162,38 @@ pub(crate) fn march_by_segments<S: Search>(search: &S, field: &HeightField, chun
     }
 }
 
-/// Runs the exact search in `f64` on every ray.
-#[inline(always)]
+/// Runs the exact search on every ray, many at once.
 pub(crate) fn march_exact(field: &HeightField, chunk: &mut Chunk<'_>) {
-    let pyramid = field.pyramid();
-    for i in 0..chunk.origins.len() {
-        if chunk.cancelled() {
-            return;
+    lanes::dispatch(packet::Exact { field, chunk });
+}
+
+impl Chunk<'_> {
+    /// Runs the exact search in `f64` on the chosen rays, one after the other.
+    #[inline(always)]
+    pub(crate) fn march_singly(
+        &mut self,
+        field: &HeightField,
+        range: std::ops::Range<usize>,
+        chosen: impl Fn(usize) -> bool,
+    ) {
+        for i in range {
+            if !chosen(i) {
+                continue;
+            }
+            if self.cancelled() {
+                return;
+            }
+            let (hit, t) = exact_hit(
+                field,
+                field.pyramid(),
+                self.origins.get(i),
+                self.directions.get(i),
+                self.from_surface,
+            );
+            self.write(i, hit.status, t, hit.steps, || {
+                field.cell_gradient(hit.cell[0], hit.cell[1], hit.local[0], hit.local[1])
+            });
         }
-        let (origin, direction) = (chunk.origins.get(i), chunk.directions.get(i));
-        let (hit, t) = exact_hit(field, pyramid, origin, direction, chunk.from_surface);
-        chunk.write(i, hit.status, t, hit.steps, || {
-            field.cell_gradient(hit.cell[0], hit.cell[1], hit.local[0], hit.local[1])
-        });
     }
 }
 
@@ -249,6 +278,10 @@ pub fn march_into(
             }
         })
         .collect();
+    if technique.info.reads == Reads::Pyramid {
+        // Built here by all threads, and not while other tasks wait for it in theirs.
+        field.margins();
+    }
     // The first ray at fault: what lies after it need not be looked at, what lies before it must be.
     let fault = AtomicUsize::new(usize::MAX);
     chunks.into_par_iter().enumerate().try_for_each(|(at, mut chunk)| {
@@ -272,7 +305,6 @@ pub fn march_into(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::search::exact::Exact;
     use crate::search::relief::Relief;
 
     fn chunk<'a>(
@@ -315,6 +347,5 @@ mod tests {
     #[test]
     fn better_instructions_change_no_bit() {
         both_ways(&Relief { linear: 32, refine: 8 });
-        both_ways(&Exact {});
     }
 }

@@ -44,6 +44,15 @@ impl<'a> RayArray<'a> {
         }
     }
 
+    /// Ray `i`, rounded to `f32`.
+    #[inline(always)]
+    pub fn get_f32(&self, i: usize) -> [f32; 3] {
+        match self {
+            Self::F32(a) => [a[3 * i], a[3 * i + 1], a[3 * i + 2]],
+            Self::F64(a) => [a[3 * i] as f32, a[3 * i + 1] as f32, a[3 * i + 2] as f32],
+        }
+    }
+
     /// Rays `from` up to `to`.
     #[inline(always)]
     pub fn slice(&self, from: usize, to: usize) -> Self {

@@ -135,7 +135,9 @@ fn bits(
             let [t, z, uv, n] = &places;
             let floats = [t[i], z[i], uv[2 * i], uv[2 * i + 1], n[3 * i], n[3 * i + 1], n[3 * i + 2]];
             let [a, b, c, d, e, f, g] = floats.map(f32::to_bits);
-            [a, b, c, d, e, f, g, steps[i], u32::from(status[i])]
+            // Neighbours go through the exact search in bundles and share some of their steps.
+            let steps = if technique.info.name == "exact" { 0 } else { steps[i] };
+            [a, b, c, d, e, f, g, steps, u32::from(status[i])]
         })
         .collect()
 }
