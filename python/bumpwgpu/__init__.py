@@ -18,6 +18,7 @@ from .errors import BakeError, BumpError, BumpWarning, CompareError, MeshError, 
 from .frames import Tangents, tangents
 from .heightmap import HeightMap
 from .marching import Hits, march
+from .mesh_maps import MeshMaps, MeshReport
 from .meshes import Mesh, MeshMaterial, Part
 from .rendering import Frame, HorizonShadows, render
 from .scene import Camera, Light, Material
@@ -44,7 +45,9 @@ __all__ = [
     "Material",
     "Mesh",
     "MeshError",
+    "MeshMaps",
     "MeshMaterial",
+    "MeshReport",
     "Part",
     "Recommendation",
     "RenderError",

@@ -18,6 +18,7 @@ _Color: TypeAlias = tuple[float, float, float, float]
 _Decoded: TypeAlias = tuple[NDArray[Any], list[str], list[str]]
 
 __all__ = [
+    "MAX_MAP_SIDE",
     "MAX_SIDE",
     "VERSION",
     "BakeError",
@@ -33,7 +34,9 @@ __all__ = [
     "SegmentReference",
     "adapters",
     "aov_names",
+    "bake_detail",
     "bake_map",
+    "bake_tangents",
     "compare_front",
     "compare_planar",
     "compare_recommend",
@@ -43,6 +46,7 @@ __all__ = [
     "map_registry",
     "march",
     "march_gpu",
+    "mesh_map_registry",
     "read_image",
     "render",
     "save_map",
@@ -54,6 +58,7 @@ __all__ = [
 ]
 
 VERSION: Final[str]
+MAX_MAP_SIDE: Final[int]
 MAX_SIDE: Final[int]
 
 class BumpError(Exception): ...
@@ -214,6 +219,17 @@ def decode_image(data: bytes) -> _Decoded: ...
 def effective_bits(samples: NDArray[Any]) -> int: ...
 def map_bytes(map: str, options: _Options, width: int, height: int, wrap: str) -> tuple[int, int]: ...
 def map_registry() -> list[dict[str, Any]]: ...
+def mesh_map_registry() -> list[dict[str, Any]]: ...
+def bake_detail(
+    plain: Mesh,
+    detail: Mesh,
+    cage: Mesh | None,
+    wanted: dict[str, Any],
+    progress: _Progress,
+) -> tuple[dict[str, NDArray[np.float32]], dict[str, Any]]: ...
+def bake_tangents(
+    mesh: Mesh, size: tuple[int, int], padding: int, progress: _Progress
+) -> NDArray[np.float32]: ...
 def march(
     field: Field,
     origins: NDArray[Any],

@@ -93,6 +93,16 @@ MAPS: Mapping[str, MapInfo] = MappingProxyType(
     {entry["name"]: _read(entry) for entry in _bumpwgpu.map_registry()}
 )
 
+#: Maps that only a mesh gives, by name.
+FROM_MESH: Mapping[str, MapInfo] = MappingProxyType(
+    {entry["name"]: _read(entry) for entry in _bumpwgpu.mesh_map_registry()}
+)
+
+
+def form_of(name: str) -> str:
+    """Which pictures a map consists of, whatever it was made from."""
+    return (MAPS[name] if name in MAPS else FROM_MESH[name]).form
+
 
 def _all_options() -> dict[str, tuple[MapOption, ...]]:
     found: dict[str, tuple[MapOption, ...]] = {}

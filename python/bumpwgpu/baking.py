@@ -16,7 +16,7 @@ from . import _bumpwgpu
 from ._atomic import replace_file
 from ._checks import choice, width_and_height
 from ._map_info import MAPS as _INFO
-from ._map_info import OPTIONS, MapChannel, MapInfo, MapOption, listing, takers
+from ._map_info import OPTIONS, MapChannel, MapInfo, MapOption, form_of, listing, takers
 from .errors import BakeError, BumpWarning
 from .heightmap import HEIGHT_MAP_SETTINGS, HeightMap, HeightSource, Wrap
 from .meshes import Mesh
@@ -127,7 +127,7 @@ class Maps(Mapping[str, Any]):
 
     def __getitem__(self, name: str) -> Any:
         layers = self._layers[name]
-        return layers if _INFO[name].form == "levels" else layers[0]
+        return layers if form_of(name) == "levels" else layers[0]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._layers)
@@ -229,7 +229,7 @@ def _save_npy(name: str, layers: tuple[NDArray[np.float32], ...], folder: Path, 
     stem = f"{prefix}_{name}" if prefix else name
     made = []
     for level, layer in enumerate(layers):
-        path = folder / (f"{stem}_{level:02}.npy" if _INFO[name].form == "levels" else f"{stem}.npy")
+        path = folder / (f"{stem}_{level:02}.npy" if form_of(name) == "levels" else f"{stem}.npy")
         data = BytesIO()
         np.save(data, layer, allow_pickle=False)
         made.append(replace_file(path, data.getvalue()))
@@ -243,25 +243,52 @@ def bake(
     progress: Progress | None = None,
     **options: Any,
 ) -> Maps:
-    """Make the maps a renderer needs from a height map.
+    """Make the maps a renderer needs from a height map, or from a mesh.
 
     Parameters
     ----------
-    source : HeightMap, path, array or PIL image
-        The heights.
+    source : HeightMap, path, array or PIL image; or Mesh, or path to one
+        The heights, or the plain mesh whose UVs the maps are for.
     maps : str or iterable of str, default ("normal",)
-        Any of :data:`bumpwgpu.baking.MAPS`.
+        Any of :data:`bumpwgpu.baking.MAPS`; of a mesh, any of :data:`bumpwgpu.mesh_maps.MESH_MAPS`.
     progress : callable or None
         Called as ``progress(done, total)``, in rows, on the calling thread; an exception from it
         stops the bake.
     **options
         What the maps take (:func:`bumpwgpu.baking.about`), such as ``kernel`` and ``convention`` of
         those that hold normals; each goes to every map that has it. For sources that are no HeightMap
-        yet, also what :class:`HeightMap` takes, such as ``scale``.
+        yet, also what :class:`HeightMap` takes, such as ``scale``. For meshes see below.
 
     Returns
     -------
     Maps
+        For a mesh :class:`bumpwgpu.MeshMaps`, which also has a report.
+
+    Other Parameters
+    ----------------
+    detail : Mesh or path
+        The detailed mesh. "normal", "height" and "ao" hold what rays from the plain mesh meet first of
+        it; "tangents" needs none.
+    size : int or (int, int), default 1024
+        Texels: the side of a square, or (width, height).
+    front, rear : float or None
+        How far above the plain mesh rays start, and how far below it they end, mesh units, along its
+        interpolated normals. None measures how far the detailed mesh rises and sinks.
+    cage : Mesh or path
+        The plain mesh with its vertices moved outwards; rays run from there to the plain mesh and
+        ``rear`` further. Same triangles in the same order.
+    samples : int, default 1
+        Along each side of a texel, up to 8; their mean is stored.
+    padding : int, default 16
+        Texels by which charts are grown.
+    space : {"tangent", "object"}
+        Of the normals; the tangent frame is the one the mesh is drawn with, MikkTSpace's unless the
+        file has its own. ``convention`` as above.
+    back_faces : bool, default False
+        Whether rays stop at triangles seen from behind.
+    rays, distance, seed
+        Of "ao": rays a sample (64), how far things shade in mesh units (None: any distance), and which
+        of many sets of directions (0).
 
     Raises
     ------
@@ -289,11 +316,15 @@ def bake(
     >>> maps["normal"][0, 0].tolist(), len(maps["pyramid"])
     ([0.0, 0.0, 1.0], 4)
     """
-    names = _map_names(maps)
     if progress is not None and not callable(progress):
         raise TypeError(f"progress must be callable, got {type(progress).__name__}")
+    # Maps of meshes are Maps too, so that module imports this one.
+    from .mesh_maps import bake_mesh, opened
+
+    source = opened(source)
     if isinstance(source, Mesh):
-        raise TypeError("bake takes height maps; mesh.tangents() gives a mesh's tangent frames")
+        return bake_mesh(source, maps, progress, options)
+    names = _map_names(maps)
     settings = {name: value for name, value in options.items() if name in HEIGHT_MAP_SETTINGS}
     given = {name: value for name, value in options.items() if name not in settings}
     _refuse_unknown(given, names)

@@ -26,6 +26,7 @@ from .compare import ELEVATIONS, Scene
 from .compare import compare as compare_techniques
 from .errors import BumpError
 from .heightmap import HeightMap
+from .mesh_maps import MESH_MAPS, MeshMaps
 from .meshes import Mesh
 from .rendering import AOVS
 from .rendering import render as render_frame
@@ -74,6 +75,13 @@ class BitsChoice(Enum):
 
     EIGHT = "8"
     SIXTEEN = "16"
+
+
+class SpaceChoice(Enum):
+    """Values of --space."""
+
+    TANGENT = "tangent"
+    OBJECT = "object"
 
 
 class DeviceChoice(Enum):
@@ -294,12 +302,43 @@ def _with_map_options(command: Callable[..., None]) -> Callable[..., None]:
     return command
 
 
+def _bake_mesh(
+    out: _Output,
+    source: Path,
+    wanted: list[str],
+    options: dict[str, Any],
+    output: Path,
+    format: Any,
+    bits: Any,
+    prefix: str,
+) -> None:
+    with out.progress("baking") as advance:
+        made = bake_maps(source, wanted, progress=advance, **options)
+    assert isinstance(made, MeshMaps)
+    paths = made.save(output, format=format, bits=bits, prefix=prefix)
+    for path in paths:
+        out.say(str(path))
+    report = {} if made.report is None else made.report._asdict()
+    if report:
+        out.say(f"heights from {-report['rear']:g} to {report['front']:g} mesh units")
+    height, width = made[wanted[0]].shape[:2]
+    out.result({"source": str(source), "width": width, "height": height, "files": paths, "report": report})
+
+
 @app.command()
 @_with_map_options
 def bake(
-    source: Annotated[Path, typer.Argument(help="Height map: PNG, TIFF, EXR, JPEG, WebP, BMP, TGA or npy.")],
+    source: Annotated[
+        Path,
+        typer.Argument(
+            help="Height map: PNG, TIFF, EXR, JPEG, WebP, BMP, TGA or npy. Or a mesh: OBJ, glTF or GLB."
+        ),
+    ],
     maps: Annotated[
-        str, typer.Option(help=f"Maps to bake, with commas between: {', '.join(MAPS)}.")
+        str,
+        typer.Option(
+            help=f"Maps to bake, with commas between: {', '.join(MAPS)}; of a mesh: {', '.join(MESH_MAPS)}."
+        ),
     ] = "normal",
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the maps.")] = Path("maps"),
     format: Annotated[FormatChoice, typer.Option(help="File format.")] = FormatChoice.PNG,
@@ -312,12 +351,64 @@ def bake(
     channel: _Channel = None,
     invert: _Invert = False,
     height_range: _Range = None,
+    detail: Annotated[Path | None, typer.Option(help="Of a mesh: the detailed mesh to bake from.")] = None,
+    cage: Annotated[
+        Path | None, typer.Option(help="Of a mesh: the same triangles further out; rays start there.")
+    ] = None,
+    size: Annotated[
+        tuple[int, int] | None, typer.Option(help="Of a mesh: width and height, texels.", min=1)
+    ] = None,
+    front: Annotated[
+        float | None, typer.Option(help="Of a mesh: how far above it rays start, mesh units.", min=0.0)
+    ] = None,
+    rear: Annotated[
+        float | None, typer.Option(help="Of a mesh: how far below it rays end, mesh units.", min=0.0)
+    ] = None,
+    samples: Annotated[
+        int | None, typer.Option(help="Of a mesh: samples along each side of a texel.", min=1, max=8)
+    ] = None,
+    padding: Annotated[
+        int | None, typer.Option(help="Of a mesh: texels that charts are grown by.", min=0)
+    ] = None,
+    space: Annotated[SpaceChoice | None, typer.Option(help="Of a mesh: space of the normals.")] = None,
+    back_faces: Annotated[
+        bool | None, typer.Option("--back-faces", help="Of a mesh: stop at triangles seen from behind.")
+    ] = None,
+    rays: Annotated[
+        int | None, typer.Option(help="Of a mesh: rays a sample of ao sends.", min=1, max=65536)
+    ] = None,
+    distance: Annotated[
+        float | None, typer.Option(help="Of a mesh: how far things shade in ao, mesh units.", min=0.0)
+    ] = None,
     json_output: _Json = False,
     quiet: _Quiet = False,
     verbose: _Verbose = False,
     **map_options: str | None,
 ) -> None:
-    """Make the maps a renderer needs from a height map."""
+    """Make the maps a renderer needs from a height map, or from a detailed mesh for a plain one."""
+    own = {
+        "detail": detail,
+        "cage": cage,
+        "size": size,
+        "front": front,
+        "rear": rear,
+        "samples": samples,
+        "padding": padding,
+        "space": space and space.value,
+        "back_faces": back_faces,
+        "rays": rays,
+        "distance": distance,
+    }
+    own = {name: value for name, value in own.items() if value is not None}
+    if source.suffix.lower() in _MESH_SUFFIXES:
+        wanted = _names(maps, MESH_MAPS, "map")
+        own |= {name: _map_option(name, text) for name, text in map_options.items() if text is not None}
+        with _session(json_output, quiet, verbose) as out:
+            _bake_mesh(out, source, wanted, own, output, format.value, bits and int(bits.value), prefix)
+        return
+    if own:
+        flags = ", ".join(f"--{name.replace('_', '-')}" for name in own)
+        raise typer.BadParameter(f"{flags} need a mesh; SOURCE is none")
     wanted = _names(maps, MAPS, "map")
     options = {name: _map_option(name, text) for name, text in map_options.items() if text is not None}
     depth: Any = int(bits.value) if bits is not None else None

@@ -58,7 +58,7 @@ pub fn map_registry(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
     Ok(list)
 }
 
-fn describe<'py>(py: Python<'py>, info: &MapInfo) -> PyResult<Bound<'py, PyDict>> {
+pub(crate) fn describe<'py>(py: Python<'py>, info: &MapInfo) -> PyResult<Bound<'py, PyDict>> {
     let entry = PyDict::new(py);
     entry.set_item("name", info.name)?;
     entry.set_item("summary", info.summary)?;
@@ -179,7 +179,7 @@ pub fn save_map(
     format: &str,
     bits: u8,
 ) -> PyResult<Vec<PathBuf>> {
-    let info = &Map::named(map).map_err(Raise::raise)?.info;
+    let info = bake::maps::about(map).map_err(Raise::raise)?;
     let format = FileFormat::named(format, bits).map_err(Raise::raise)?;
     let layers = layers.iter().map(|array| layer(info, array)).collect::<PyResult<_>>()?;
     let baked = Baked { info, options: info.defaults(), layers };

@@ -5,6 +5,7 @@
 
 mod baking;
 mod compare;
+mod detail;
 mod errors;
 mod field;
 mod images;
@@ -23,6 +24,8 @@ mod _bumpwgpu {
     use crate::baking::{bake_map, map_bytes, map_registry, save_map};
     #[pymodule_export]
     use crate::compare::{CompareView, SegmentReference, compare_front, compare_planar, compare_recommend};
+    #[pymodule_export]
+    use crate::detail::{bake_detail, bake_tangents, mesh_map_registry};
     #[pymodule_export]
     use crate::errors::classes::{BakeError, BumpError, CompareError, MeshError, RenderError};
     #[pymodule_export]
@@ -44,6 +47,10 @@ mod _bumpwgpu {
     /// Longest side of a height map, in texels.
     #[pymodule_export]
     const MAX_SIDE: usize = heightfield::field::MAX_SIDE;
+
+    /// Longest side of a map baked from a mesh, in texels.
+    #[pymodule_export]
+    const MAX_MAP_SIDE: usize = ::mesh::detail::MAX_MAP_SIDE;
 
     #[pymodule_init]
     fn init() {

@@ -4,6 +4,7 @@
 //! [`REGISTRY`]. Python's `bake`, the command line, the docs and the tests that walk all maps follow
 //! from that. Maps that come from elsewhere (a detailed mesh) have a [`MapInfo`] only.
 
+mod from_mesh;
 mod options;
 mod plan;
 mod store;
@@ -15,6 +16,7 @@ use crate::{
     BakeError, Progress, curvature, distance, horizon, mips, moments, normal, occlusion, pyramid, relief,
 };
 
+pub use from_mesh::{FROM_MESH, HEIGHT, TANGENTS, about};
 pub use options::{Kind, MapOption, Options, Value};
 pub use plan::{Grid, Plan};
 pub use store::{FileFormat, save};
@@ -205,7 +207,7 @@ mod tests {
     use super::*;
 
     /// Names that an option may not have: settings of height maps, of files, of the command line.
-    const TAKEN: [&str; 24] = [
+    const TAKEN: [&str; 34] = [
         "source",
         "maps",
         "output",
@@ -227,6 +229,16 @@ mod tests {
         "progress",
         "cache",
         "detail",
+        "cage",
+        "size",
+        "front",
+        "rear",
+        "samples",
+        "padding",
+        "space",
+        "back_faces",
+        "rays",
+        "distance",
         "folder",
         "name",
         "field",

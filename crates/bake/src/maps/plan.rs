@@ -87,7 +87,7 @@ impl Plan {
     ///
     /// # Errors
     /// [`BakeError::Memory`].
-    pub(crate) fn check(&self, info: &MapInfo) -> Result<(), BakeError> {
+    pub fn check(&self, info: &MapInfo) -> Result<(), BakeError> {
         self.check_against(info, available_memory())
     }
 
