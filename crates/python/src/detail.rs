@@ -69,10 +69,16 @@ impl Wanted {
 }
 
 /// Fails unless the machine can hold `channels` floats a texel and `besides` bytes.
-fn check_memory(info: &'static MapInfo, size: (usize, usize), channels: usize, besides: u128) -> PyResult<()> {
+fn check_memory(
+    info: &'static MapInfo,
+    size: (usize, usize),
+    channels: usize,
+    besides: u128,
+) -> PyResult<()> {
     let grid = Grid { width: size.0, height: size.1, wrap: Wrap::Clamp };
     // The description has one number of channels; the rest counts as working memory.
-    let more = channels.saturating_sub(info.channels.len()) as u128 * grid.texels() * size_of::<f32>() as u128;
+    let more =
+        channels.saturating_sub(info.channels.len()) as u128 * grid.texels() * size_of::<f32>() as u128;
     let flags = grid.texels() * 6;
     Plan::single(grid).working(more + flags + besides).check(info).map_err(Raise::raise)
 }

@@ -17,6 +17,12 @@ pub(super) struct Leaf {
     triangles: [u32; LANES],
 }
 
+/// The smaller number; the second one when they cannot be compared.
+#[inline(always)]
+fn least(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
 impl Leaf {
     /// The leaf of some triangles, and the box around it.
     pub(super) fn new(
@@ -71,29 +77,26 @@ impl Leaf {
             }
         }
         let mut t = [0.0; LANES];
+        // Every step is one comparison and one choice a lane, which is what registers can do.
         for i in 0..LANES {
             let [u, v, w] = [weights[0][i], weights[1][i], weights[2][i]];
             let depth = (u * z[0][i] + v * z[1][i] + w * z[2][i]) / (u + v + w);
-            let positive = (u >= 0.0) & (v >= 0.0) & (w >= 0.0);
-            let negative = (u <= 0.0) & (v <= 0.0) & (w <= 0.0);
+            let (low, high) = (least(least(u, v), w), -least(least(-u, -v), -w));
             let inside = match sides {
-                Sides::Both => positive | negative,
-                Sides::Front if ray.mirrored => negative,
-                Sides::Front => positive,
+                Sides::Both => -least(-low, high),
+                Sides::Front if ray.mirrored => -high,
+                Sides::Front => low,
             };
             // A triangle without area has a depth of NaN, which is between no bounds.
-            let valid = inside & (depth >= ray.start) & (depth <= ray.end);
-            t[i] = if valid { depth } else { f32::INFINITY };
+            let met = if inside >= 0.0 { depth } else { f32::INFINITY };
+            let met = if met >= ray.start { met } else { f32::INFINITY };
+            t[i] = if met <= ray.end { met } else { f32::INFINITY };
         }
-        let mut best = 0;
-        for i in 1..LANES {
-            if t[i] < t[best] {
-                best = i;
-            }
-        }
-        if t[best] == f32::INFINITY {
+        let nearest = t.iter().fold(f32::INFINITY, |a, &b| least(a, b));
+        if nearest == f32::INFINITY {
             return None;
         }
+        let best = t.iter().position(|&t| t == nearest).unwrap_or(0);
         ray.end = t[best];
         let w = [0, 1, 2].map(|c| weights[c][best]);
         let sum = w[0] + w[1] + w[2];
