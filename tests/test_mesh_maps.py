@@ -72,7 +72,7 @@ def test_heights_come_back(bumpy: bw.Mesh) -> None:
     heights = (relief.array - relief.base) * relief.scale
     expected = bumps(*centres(64))
     assert abs(heights - expected).max() < 3e-4
-    assert abs(heights.T - expected).max() > 0.05  # negative control
+    assert abs(heights.T - expected).max() > 0.04  # negative control
     with pytest.raises(ValueError, match="height"):
         bw.bake(bw.Mesh.quad(), "normal", detail=bumpy, size=8).height_map()
 
@@ -238,7 +238,7 @@ def test_the_picture_of_the_maps_is_that_of_the_detail(bumpy: bw.Mesh, gpu: None
             material,
             camera=camera,
             lights=lights,
-            technique="flat" if material.normal is None else "tangent",
+            technique="flat" if material.normal is None else "normal",
             size=(96, 96),
             shadows=False,
         )

@@ -30,7 +30,7 @@ pub fn mesh_map_registry(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
 /// What is wanted from a detailed mesh.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-struct Wanted {
+pub struct Wanted {
     normal: bool,
     height: bool,
     ao: bool,
