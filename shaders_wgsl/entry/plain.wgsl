@@ -1,35 +1,8 @@
-// A mesh with nothing but its normals: surface/flat.
-#import "bindings/draw.wgsl"
-#import "bindings/frame.wgsl"
-#import "lib/surface_point.wgsl"
+// A mesh with nothing but its normals: surface/flat, surface/bump_derivative.
+#import "entry/stage_plain.wgsl"
 #import "shading/mesh.wgsl"
-
-struct VertexIn {
-    @location(0) position: vec3f,
-    @location(1) normal: vec3f,
-    @location(2) uv: vec2f,
-}
-
-struct Varyings {
-    @builtin(position) clip: vec4f,
-    @location(0) position: vec3f,
-    @location(1) normal: vec3f,
-    @location(2) uv: vec2f,
-}
-
-@vertex
-fn vertex(in: VertexIn) -> Varyings {
-    var out: Varyings;
-    out.clip = frame.clip_from_relative * vec4f(relative_position(in.position), 1.0);
-    out.position = in.position;
-    out.normal = in.normal;
-    out.uv = in.uv;
-    return out;
-}
 
 @fragment
 fn fragment(in: Varyings, @builtin(front_facing) front: bool) -> Targets {
-    let surface = SurfaceFrame(vec3f(0.0), vec3f(0.0), in.normal);
-    let point = surface_point(surface, vec4f(0.0), in.uv, dpdx(in.uv), dpdy(in.uv), front);
-    return shade_on_mesh(in.position, point);
+    return shade_on_mesh(in.position, seen(in, front));
 }

@@ -1,41 +1,8 @@
-// A mesh whose normal comes from slopes: surface/bump, surface/normal.
-#import "bindings/draw.wgsl"
-#import "bindings/frame.wgsl"
-#import "lib/surface_point.wgsl"
+// A mesh whose normal comes from slopes: surface/bump and its kin, surface/normal.
+#import "entry/stage_sloped.wgsl"
 #import "shading/mesh.wgsl"
-
-struct VertexIn {
-    @location(0) position: vec3f,
-    @location(1) normal: vec3f,
-    @location(2) uv: vec2f,
-    @location(3) dpdu: vec3f,
-    @location(4) dpdv: vec3f,
-}
-
-struct Varyings {
-    @builtin(position) clip: vec4f,
-    @location(0) position: vec3f,
-    @location(1) normal: vec3f,
-    @location(2) uv: vec2f,
-    @location(3) dpdu: vec3f,
-    @location(4) dpdv: vec3f,
-}
-
-@vertex
-fn vertex(in: VertexIn) -> Varyings {
-    var out: Varyings;
-    out.clip = frame.clip_from_relative * vec4f(relative_position(in.position), 1.0);
-    out.position = in.position;
-    out.normal = in.normal;
-    out.uv = in.uv;
-    out.dpdu = in.dpdu;
-    out.dpdv = in.dpdv;
-    return out;
-}
 
 @fragment
 fn fragment(in: Varyings, @builtin(front_facing) front: bool) -> Targets {
-    let surface = SurfaceFrame(in.dpdu, in.dpdv, in.normal);
-    let point = surface_point(surface, vec4f(0.0), in.uv, dpdx(in.uv), dpdy(in.uv), front);
-    return shade_on_mesh(in.position, point);
+    return shade_on_mesh(in.position, seen(in, front));
 }

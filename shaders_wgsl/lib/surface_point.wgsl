@@ -4,17 +4,23 @@
 
 struct SurfacePoint {
     surface: SurfaceFrame,
+    dndu: vec3f,           // dN/du and dN/dv, per tile, object space; 0 where the entry has none
+    dndv: vec3f,
     tangent: vec4f,        // glTF tangent, interpolated; 0 where the entry has none
     uv: vec2f,             // where to look, displaced or not
     uv_dx: vec2f,          // derivatives of the undisplaced uv along the screen: those of displaced
     uv_dy: vec2f,          // ones jump at every edge of the relief
+    position_dx: vec3f,    // derivatives of the mesh surface along the screen, object space; 0 where the
+    position_dy: vec3f,    // entry has none
+    height: f32,           // where a search ended, 0..1; 0 where none did
 }
 
-// The point of a fragment from its interpolated attributes. Seen from behind, a two-sided surface has
-// its relief on that side.
-fn surface_point(
-    surface: SurfaceFrame, tangent: vec4f, uv: vec2f, uv_dx: vec2f, uv_dy: vec2f, front: bool,
-) -> SurfacePoint {
-    let up = select(-1.0, 1.0, front) * normalize_or(surface.normal, vec3f(0.0, 0.0, 1.0));
-    return SurfacePoint(SurfaceFrame(surface.dpdu, surface.dpdv, up), tangent, uv, uv_dx, uv_dy);
+// A point with its normal made unit. Seen from behind, a two-sided surface has its relief on that side.
+fn facing(point: SurfacePoint, front: bool) -> SurfacePoint {
+    let side = select(-1.0, 1.0, front);
+    var turned = point;
+    turned.surface.normal = side * normalize_or(point.surface.normal, vec3f(0.0, 0.0, 1.0));
+    turned.dndu = side * point.dndu;
+    turned.dndv = side * point.dndv;
+    return turned;
 }

@@ -31,6 +31,7 @@ fn shade_relief(position: vec3f, point: SurfacePoint) -> ReliefTargets {
     let hit_position = position + direction * (ray.t_start + found.tau * ray.t_length);
     var at_hit = point;
     at_hit.uv = hit.xy;
+    at_hit.height = hit.z;
     let normal = world_normal(shading_normal(at_hit));
     let albedo = albedo_at(hit.xy, point.uv_dx, point.uv_dy);
     let relative = relative_position(hit_position);

@@ -28,6 +28,6 @@ pub use detail::{
     DetailMaps, DetailOptions, DetailReport, NormalSpace, SkyOptions, bake_detail, tangent_map,
 };
 pub use error::MeshError;
-pub use frame::{Derivatives, FrameMethod, Split, derivatives, tangents};
+pub use frame::{Derivatives, FrameMethod, Split, derivatives, normal_derivatives, tangents};
 pub use material::{ImageSource, MaterialSource};
 pub use mesh::{Mesh, Part};

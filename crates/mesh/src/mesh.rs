@@ -7,7 +7,7 @@ use glam::{Vec2, Vec3, Vec4};
 
 use crate::arrays::{Arrays, checked};
 use crate::error::MeshError;
-use crate::frame::{FrameMethod, Split, Surface, derivatives};
+use crate::frame::{FrameMethod, Split, Surface, derivatives, normal_derivatives};
 use crate::material::MaterialSource;
 
 /// A run of triangles with one name and one material.
@@ -179,6 +179,12 @@ impl Mesh {
         mesh.dpdv = source.iter().map(|&i| self.dpdv[i as usize]).collect();
         mesh.warnings = warnings;
         Ok(mesh)
+    }
+
+    /// `dN/du` and `dN/dv` (`v` down) of the smooth normals at each vertex, per UV unit: what a relief
+    /// needs to know of the surface's curvature. Zero where the UVs are degenerate.
+    pub fn normal_derivatives(&self) -> [Vec<Vec3>; 2] {
+        normal_derivatives(&self.positions, &self.normals, &self.uvs, &self.indices)
     }
 
     /// Smallest and largest corner of the box around the vertices.

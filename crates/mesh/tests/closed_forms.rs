@@ -44,7 +44,8 @@ fn against(split: &Split, mesh: &Mesh, point: impl Fn(Vec2) -> SurfacePoint) -> 
 fn sheared(u: f64, v: f64) -> SurfacePoint {
     let lean = 30f64.to_radians().tan();
     let (dpdu, dpdv) = (DVec3::X, DVec3::new(lean, -1.0, 0.0));
-    SurfacePoint { position: u * dpdu + v * dpdv, dpdu, dpdv, along: DVec3::X, normal: DVec3::Z }
+    let (dndu, dndv) = (DVec3::ZERO, DVec3::ZERO);
+    SurfacePoint { position: u * dpdu + v * dpdv, dpdu, dpdv, dndu, dndv, along: DVec3::X, normal: DVec3::Z }
 }
 
 fn sheared_mesh() -> Mesh {
@@ -60,7 +61,8 @@ fn shapes() -> [Shape; 4] {
     fn quad(uv: Vec2) -> SurfacePoint {
         let (right, down) = (DVec3::X, DVec3::NEG_Y);
         let position = right * f64::from(uv.x - 0.5) + down * f64::from(uv.y - 0.5);
-        SurfacePoint { position, dpdu: right, dpdv: down, along: right, normal: DVec3::Z }
+        let (dndu, dndv) = (DVec3::ZERO, DVec3::ZERO);
+        SurfacePoint { position, dpdu: right, dpdv: down, dndu, dndv, along: right, normal: DVec3::Z }
     }
     let sphere = |uv: Vec2| sphere_point(0.5, uv.x.into(), uv.y.into());
     let torus = |uv: Vec2| torus_point(0.7, 0.3, uv.x.into(), uv.y.into());

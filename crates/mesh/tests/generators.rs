@@ -63,6 +63,9 @@ fn check_form(point: impl Fn(f64, f64) -> SurfacePoint) {
             assert!((dv - at.dpdv).length() < 1e-8 * (1.0 + dv.length()), "{dv} {}", at.dpdv);
             let normal = dv.cross(du).normalize();
             assert!((normal - at.normal).length() < 1e-8);
+            let turned = |a: SurfacePoint, b: SurfacePoint| (a.normal - b.normal) / (2.0 * h);
+            assert!((turned(point(u + h, v), point(u - h, v)) - at.dndu).length() < 1e-7);
+            assert!((turned(point(u, v + h), point(u, v - h)) - at.dndv).length() < 1e-7);
             assert!((at.along - du.normalize()).length() < 1e-8);
         }
     }
@@ -142,6 +145,7 @@ fn averaged_frames_approach_the_closed_forms() {
         assert!(found.warnings.is_empty(), "{name}: {:?}", found.warnings);
         let split = mesh.tangents(FrameMethod::MIKKTSPACE).unwrap();
         assert_eq!(split.source.len(), mesh.positions.len(), "{name}: nothing to split");
+        let [dndu, dndv] = mesh.normal_derivatives();
         for i in 0..mesh.positions.len() {
             // Next to a pole the triangles span a finite turn however fine the mesh.
             if name == "sphere" && !(0.15..0.85).contains(&mesh.uvs[i].y) {
@@ -151,6 +155,16 @@ fn averaged_frames_approach_the_closed_forms() {
             assert!(error < 0.02, "{name} vertex {i}: dP/du off by {error}");
             let error = (found.dpdv[i] - mesh.dpdv[i]).length() / mesh.dpdv[i].length();
             assert!(error < 0.02, "{name} vertex {i}: dP/dv off by {error}");
+            let uv = mesh.uvs[i].as_dvec2();
+            let truth = if name == "sphere" {
+                sphere_point(1.0, uv.x, uv.y)
+            } else {
+                torus_point(1.0, 0.4, uv.x, uv.y)
+            };
+            for (found, truth) in [(dndu[i], truth.dndu), (dndv[i], truth.dndv)] {
+                let error = (found.as_dvec3() - truth).length();
+                assert!(error < 0.02 * std::f64::consts::TAU, "{name} vertex {i}: dN off by {error}");
+            }
             let angle = degrees(split.tangents[i].truncate(), mesh.tangents[i].truncate());
             assert!(angle < 1.0 && split.tangents[i].w == 1.0, "{name} vertex {i}: {angle} degrees");
         }

@@ -62,8 +62,8 @@ pub fn techniques(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
         entry.set_item("parameters", parameters)?;
         list.append(entry)
     };
-    for (name, summary) in render::PLAIN_TECHNIQUES {
-        add(name, summary, "", false, false, Vec::new())?;
+    for plain in &render::PLAIN_TECHNIQUES {
+        add(plain.name, plain.summary, plain.source, false, false, Vec::new())?;
     }
     for info in Technique::all() {
         let parameters = info

@@ -55,6 +55,7 @@ impl Geometry {
                 wgpu::BufferUsages::INDEX,
             )?,
         };
+        let bend = if locations.contains(&6) { mesh.normal_derivatives() } else { Default::default() };
         for &location in locations {
             let centred: Vec<Vec3>;
             let bytes: &[u8] = match location {
@@ -66,7 +67,9 @@ impl Geometry {
                 2 => bytemuck::cast_slice(&mesh.uvs),
                 3 => bytemuck::cast_slice(&mesh.dpdu),
                 4 => bytemuck::cast_slice(&mesh.dpdv),
-                _ => bytemuck::cast_slice(&mesh.tangents),
+                5 => bytemuck::cast_slice(&mesh.tangents),
+                6 => bytemuck::cast_slice(&bend[0]),
+                _ => bytemuck::cast_slice(&bend[1]),
             };
             let label = ATTRIBUTES[location].0;
             geometry.attributes[location] =

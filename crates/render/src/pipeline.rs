@@ -44,19 +44,22 @@ pub(crate) enum Pipeline {
 }
 
 /// Vertex attributes in the order of their shader locations.
-pub(crate) const ATTRIBUTES: [(&str, wgpu::VertexFormat); 6] = [
+pub(crate) const ATTRIBUTES: [(&str, wgpu::VertexFormat); 8] = [
     ("position", wgpu::VertexFormat::Float32x3),
     ("normal", wgpu::VertexFormat::Float32x3),
     ("uv", wgpu::VertexFormat::Float32x2),
     ("dpdu", wgpu::VertexFormat::Float32x3),
     ("dpdv", wgpu::VertexFormat::Float32x3),
     ("tangent", wgpu::VertexFormat::Float32x4),
+    ("dndu", wgpu::VertexFormat::Float32x3),
+    ("dndv", wgpu::VertexFormat::Float32x3),
 ];
 
 /// The locations that an entry reads.
 pub(crate) fn attributes(entry: &str) -> &'static [usize] {
     match entry {
-        "sloped" | "relief" => &[0, 1, 2, 3, 4],
+        "sloped" => &[0, 1, 2, 3, 4],
+        "bent" | "relief" => &[0, 1, 2, 3, 4, 6, 7],
         "mapped" | "dot3" => &[0, 1, 2, 5],
         "relief_mapped" => &[0, 1, 2, 3, 4, 5],
         _ => &[0, 1, 2],
@@ -67,8 +70,7 @@ pub(crate) fn attributes(entry: &str) -> &'static [usize] {
 pub(crate) fn reads_of(technique: &TechniqueChoice) -> Option<Reads> {
     match technique {
         TechniqueChoice::Search(technique) => Some(technique.info.reads),
-        TechniqueChoice::Bump => Some(Reads::Heights),
-        _ => None,
+        TechniqueChoice::Plain(plain) => plain.reads,
     }
 }
 

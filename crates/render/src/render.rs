@@ -12,7 +12,7 @@ use crate::targets::{TargetSet, Targets};
 use crate::timer::Timer;
 use crate::uniforms::FrameInfo;
 use crate::unpack::Unpacker;
-use crate::{Device, Frame, RenderError, Request, Scene, Stats, TechniqueChoice};
+use crate::{Device, Frame, RenderError, Request, Scene, Stats};
 
 /// Pixels drawn at once. Larger pictures are drawn in bands of rows, so that the memory that the
 /// targets take does not grow with the picture.
@@ -105,7 +105,7 @@ fn warnings(scene: &Scene<'_>, request: &Request) -> Vec<String> {
     {
         warnings.push(format!("technique {name:?} casts no shadows; shadows=True has no effect"));
     }
-    if request.technique == TechniqueChoice::Dot3 {
+    if request.technique.name() == "dot3" {
         if scene.lights.len() > 1 {
             warnings.push(format!("dot3 knows one light; the first of {} is used", scene.lights.len()));
         }

@@ -4,29 +4,16 @@ use heightfield::Technique;
 
 use crate::RenderError;
 use crate::layouts::MaterialMaps;
+use crate::plain::{PLAIN_TECHNIQUES, PlainTechnique};
 
 /// How the relief is shown.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TechniqueChoice {
-    /// The bare mesh.
-    Flat,
-    /// Normals bent by the heights as they are read.
-    Bump,
-    /// Normals from a map.
-    Normal,
-    /// 8-bit fixed-function diffuse.
-    Dot3,
+    /// On the mesh, by its normals at most.
+    Plain(&'static PlainTechnique),
     /// A search along the view ray.
     Search(Technique),
 }
-
-/// Names of the techniques that do not search, with one line for users each.
-pub const PLAIN_TECHNIQUES: [(&str, &str); 4] = [
-    ("flat", "the bare mesh, no relief"),
-    ("bump", "normals bent by the heights, read at each point (Blinn 1978)"),
-    ("normal", "normals from a map baked from the heights, or the material's own"),
-    ("dot3", "8-bit fixed-function diffuse with a normalisation cube map, one light"),
-];
 
 impl TechniqueChoice {
     /// A technique by its name, with its default parameters.
@@ -34,30 +21,24 @@ impl TechniqueChoice {
     /// # Errors
     /// [`RenderError::UnknownTechnique`] lists the names.
     pub fn named(name: &str) -> Result<Self, RenderError> {
-        Ok(match name {
-            "flat" => Self::Flat,
-            "bump" => Self::Bump,
-            "normal" => Self::Normal,
-            "dot3" => Self::Dot3,
-            _ => Self::Search(Technique::named(name).map_err(|_| RenderError::UnknownTechnique {
-                name: name.to_owned(),
-                known: Self::names().collect::<Vec<_>>().join(", "),
-            })?),
+        if let Some(plain) = PLAIN_TECHNIQUES.iter().find(|plain| plain.name == name) {
+            return Ok(Self::Plain(plain));
+        }
+        Technique::named(name).map(Self::Search).map_err(|_| RenderError::UnknownTechnique {
+            name: name.to_owned(),
+            known: Self::names().collect::<Vec<_>>().join(", "),
         })
     }
 
     /// All names.
     pub fn names() -> impl Iterator<Item = &'static str> {
-        PLAIN_TECHNIQUES.iter().map(|(name, _)| *name).chain(Technique::all().iter().map(|info| info.name))
+        PLAIN_TECHNIQUES.iter().map(|plain| plain.name).chain(Technique::all().iter().map(|info| info.name))
     }
 
     /// Its name.
     pub fn name(&self) -> &'static str {
         match self {
-            Self::Flat => "flat",
-            Self::Bump => "bump",
-            Self::Normal => "normal",
-            Self::Dot3 => "dot3",
+            Self::Plain(plain) => plain.name,
             Self::Search(technique) => technique.info.name,
         }
     }
@@ -79,17 +60,19 @@ impl TechniqueChoice {
 
     /// The shader files it is made of. `own_normals`: the material has a normal map.
     pub(crate) fn program(&self, own_normals: bool) -> Program {
-        let (entry, surface, maps) = match (self, own_normals) {
-            (Self::Flat, _) => ("plain", "flat", MaterialMaps::None),
-            (Self::Bump, _) => ("sloped", "bump", MaterialMaps::None),
-            (Self::Normal, false) => ("sloped", "normal", MaterialMaps::Map),
-            (Self::Normal, true) => ("mapped", "tangent", MaterialMaps::Map),
-            (Self::Dot3, _) => ("dot3", "dot3", MaterialMaps::MapAndCube),
-            (Self::Search(_), false) => ("relief", "normal", MaterialMaps::Map),
-            (Self::Search(_), true) => ("relief_mapped", "tangent", MaterialMaps::Map),
-        };
-        let search = if let Self::Search(technique) = self { Some(technique.info.name) } else { None };
-        Program { entry, search, surface, maps, horizon: false }
+        match self {
+            Self::Plain(plain) => {
+                let own = plain.own_normals.filter(|_| own_normals);
+                let (entry, surface) = own.unwrap_or((plain.entry, plain.surface));
+                Program { entry, search: None, surface, maps: plain.maps, horizon: false }
+            }
+            Self::Search(technique) => {
+                let (entry, surface) =
+                    if own_normals { ("relief_mapped", "tangent") } else { ("relief", "displaced") };
+                let search = Some(technique.info.name);
+                Program { entry, search, surface, maps: MaterialMaps::Map, horizon: false }
+            }
+        }
     }
 }
 

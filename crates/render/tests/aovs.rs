@@ -7,7 +7,7 @@ mod common;
 use std::sync::Arc;
 
 use common::{fbm, field, front, mesh_of, sun};
-use glam::{DVec3, Mat4, Quat, Vec2, Vec3};
+use glam::{DVec2, DVec3, Mat4, Quat, Vec2, Vec3};
 use heightfield::{Extent, HeightField, Technique, Wrap};
 use mesh::Mesh;
 use render::surface::{self, SurfaceFrame};
@@ -153,12 +153,15 @@ fn sheared() -> (Mesh, SurfaceFrame) {
     let positions = [corner(0.0, 0.0), corner(0.0, 1.0), corner(1.0, 1.0), corner(1.0, 0.0)];
     let uvs = [Vec2::ZERO, Vec2::Y, Vec2::ONE, Vec2::X];
     let mesh = mesh_of(&positions, &[normal; 4], &uvs, &[[0, 1, 2], [0, 2, 3]]);
-    (mesh, SurfaceFrame { dpdu: along_u, dpdv: along_v, normal })
+    let frame =
+        SurfaceFrame { dpdu: along_u.as_dvec3(), dpdv: along_v.as_dvec3(), normal: normal.as_dvec3() };
+    (mesh, frame)
 }
 
-fn worst_angle(frame: &Frame, mut expected: impl FnMut(usize) -> Vec3) -> f32 {
-    let angles =
-        covered(frame).into_iter().map(|at| vec3(&frame.aovs.normal, at).angle_between(expected(at)));
+fn worst_angle(frame: &Frame, mut expected: impl FnMut(usize) -> DVec3) -> f32 {
+    let angles = covered(frame)
+        .into_iter()
+        .map(|at| vec3(&frame.aovs.normal, at).angle_between(expected(at).as_vec3()));
     let mut angles: Vec<f32> = angles.collect();
     assert!(angles.len() > 5000, "{} pixels", angles.len());
     angles.sort_by(f32::total_cmp);
@@ -182,11 +185,36 @@ fn surfaces_agree_with_their_twins() {
         let worst = worst_angle(&flat, |_| surface::flat(&frame_of_mesh));
         assert!(worst < 0.1, "flat {wrap:?}: {worst} degrees");
 
-        let bump = picture("bump");
         let reach = Vec2::new(1.0 / 32.0, 1.0 / 24.0);
-        let worst = worst_angle(&bump, |at| surface::bump(&field, &frame_of_mesh, uv(&bump, at), reach));
-        println!("bump {wrap:?}: {worst} degrees");
-        assert!(worst < 0.1, "bump {wrap:?}: {worst} degrees");
+        // The quad is flat: what bends with the mesh is tested on sphere and torus.
+        let bend = [DVec3::ZERO; 2];
+        let twins: [(&str, &dyn Fn(Vec2) -> DVec3); 5] = [
+            ("bump", &|uv| surface::bump(&field, &frame_of_mesh, uv, reach)),
+            ("bump_forward", &|uv| surface::bump_forward(&field, &frame_of_mesh, uv, reach)),
+            ("bump_orthogonal", &|uv| surface::bump_orthogonal(&field, &frame_of_mesh, uv, reach)),
+            ("bump_blinn", &|uv| surface::bump_blinn(&field, &frame_of_mesh, uv, reach)),
+            ("bump_exact", &|uv| surface::bump_exact(&field, &frame_of_mesh, bend, uv, reach)),
+        ];
+        for (technique, twin) in twins {
+            let frame = picture(technique);
+            let worst = worst_angle(&frame, |at| twin(uv(&frame, at)));
+            println!("{technique} {wrap:?}: {worst} degrees");
+            assert!(worst < 0.1, "{technique} {wrap:?}: {worst} degrees");
+        }
+        // Any two derivatives along the surface will do: those of a screen that is the mapping itself.
+        let axes = [frame_of_mesh.dpdu, frame_of_mesh.dpdv];
+        let screen = surface::ScreenDerivatives { position: axes, uv: [DVec2::X, DVec2::Y] };
+        let frame = picture("bump_derivative");
+        let normal = frame_of_mesh.normal;
+        let worst = worst_angle(&frame, |at| {
+            surface::bump_derivative(&field, normal, &screen, uv(&frame, at), reach)
+        });
+        println!("bump_derivative {wrap:?}: {worst} degrees");
+        assert!(worst < 0.1, "bump_derivative {wrap:?}: {worst} degrees");
+        // Negative control: the twin of another formula is told apart.
+        let wrong =
+            worst_angle(&frame, |at| surface::bump_orthogonal(&field, &frame_of_mesh, uv(&frame, at), reach));
+        assert!(wrong > 0.5, "{wrong} degrees");
 
         for technique in ["normal", "exact"] {
             let frame = picture(technique);

@@ -136,7 +136,8 @@ fn odd_scenes_are_fine() {
         ambient: [0.0; 3],
         background: [1.0, 0.0, 0.0, 1.0],
     };
-    let frame = render::render(&device, &empty, &Request::new(TechniqueChoice::Flat, 3, 2)).unwrap();
+    let frame = render::render(&device, &empty, &Request::new(TechniqueChoice::named("flat").unwrap(), 3, 2))
+        .unwrap();
     assert_eq!(frame.color, [255, 0, 0, 255].repeat(6));
 }
 
@@ -153,7 +154,7 @@ fn too_large_maps_are_refused_not_tried() {
         ambient: [0.5; 3],
         background: [0.0; 4],
     };
-    match render::render(&device, &scene, &Request::new(TechniqueChoice::Bump, 8, 8)) {
+    match render::render(&device, &scene, &Request::new(TechniqueChoice::named("bump").unwrap(), 8, 8)) {
         Ok(_) => (),
         Err(RenderError::Limit { got, .. }) => assert_eq!(got, 65_536),
         Err(error) => panic!("{error}"),

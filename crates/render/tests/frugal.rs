@@ -50,7 +50,8 @@ fn nothing_is_baked_uploaded_or_compiled_in_vain() {
         let shadow_rays = frame.stats.shadow_rays > 0;
         assert_eq!(shadow_rays, request.technique.casts_shadows(), "{name}: shadow rays");
     }
-    let request = Request { aovs: AovSet::DEPTH, ..Request::new(TechniqueChoice::Flat, 32, 32) };
+    let request =
+        Request { aovs: AovSet::DEPTH, ..Request::new(TechniqueChoice::named("flat").unwrap(), 32, 32) };
     let aovs = render::render(&device, &scene, &request).unwrap().aovs;
     assert!(aovs.depth.is_some() && aovs.uv.is_none() && aovs.normal.is_none());
 

@@ -34,7 +34,7 @@ fn check(host: Layout, source: &str, name: &str) {
 
 #[test]
 fn host_structs_match() {
-    let relief = shaders::compose("relief", Some("relief"), Some("normal")).unwrap();
+    let relief = shaders::compose("relief", Some("relief"), Some("displaced")).unwrap();
     check(
         layout!(FrameInfo: clip_from_relative, forward, ambient, light_count, pad_0, pad_1, pad_2),
         &relief,

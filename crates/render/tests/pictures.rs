@@ -231,7 +231,7 @@ fn shadows_fall_away_from_the_light() {
     let frame = render::render(
         &device,
         &scene,
-        &Request { shadows: Some(true), ..Request::new(TechniqueChoice::Bump, 8, 8) },
+        &Request { shadows: Some(true), ..Request::new(TechniqueChoice::named("bump").unwrap(), 8, 8) },
     )
     .unwrap();
     assert!(frame.warnings.iter().any(|warning| warning.contains("bump")), "{:?}", frame.warnings);
@@ -248,7 +248,9 @@ fn point_lights_fall_off_with_the_square() {
         scene.ambient = [0.0; 3];
         scene.lights =
             vec![Light::Point { position: DVec3::new(0.0, 0.0, distance), color: [1.0; 3], intensity: 0.8 }];
-        let frame = render::render(&device, &scene, &Request::new(TechniqueChoice::Flat, 33, 33)).unwrap();
+        let frame =
+            render::render(&device, &scene, &Request::new(TechniqueChoice::named("flat").unwrap(), 33, 33))
+                .unwrap();
         let middle = f32::from(frame.color[4 * (16 * 33 + 16)]) / 255.0;
         brightness.push(render::texture::linear_from_srgb(middle));
     }

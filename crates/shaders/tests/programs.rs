@@ -8,11 +8,12 @@ use heightfield::Technique;
 
 /// Entries with the surfaces they are composed with; `true`: and with every search.
 const ENTRIES: &[(&str, &[&str], bool)] = &[
-    ("plain", &["flat"], false),
-    ("sloped", &["bump", "normal"], false),
+    ("plain", &["flat", "bump_derivative"], false),
+    ("sloped", &["bump", "bump_forward", "bump_orthogonal", "bump_blinn", "normal"], false),
+    ("bent", &["bump_exact"], false),
     ("mapped", &["tangent"], false),
     ("dot3", &["dot3"], false),
-    ("relief", &["normal"], true),
+    ("relief", &["displaced"], true),
     ("relief_mapped", &["tangent"], true),
     ("kernels/march", &[], true),
 ];

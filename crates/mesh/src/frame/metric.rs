@@ -8,7 +8,7 @@
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
-use super::{Surface, convention};
+use super::{FaceFrame, Surface, convention, face_frame};
 use crate::normals::{corner_angles, face_normal};
 
 /// Derivatives at each vertex.
@@ -41,22 +41,10 @@ pub fn derivatives(
     indices: &[[u32; 3]],
 ) -> Derivatives {
     let surface = Surface { positions, normals, uvs, indices, quads: &[] };
-    let mut sums = vec![[Sum::default(); 2]; positions.len()];
-    for (face, triangle) in indices.iter().enumerate() {
-        let plane = face_normal(positions, triangle);
-        let Some(frame) = surface.face_frame(face).filter(|_| plane != DVec3::ZERO) else { continue };
-        let side = usize::from(frame.dpdu.cross(frame.dpdv).dot(plane) > 0.0);
-        let angles = corner_angles(positions, triangle);
-        for (corner, &vertex) in triangle.iter().enumerate() {
-            let normal = normals[vertex as usize].as_dvec3();
-            let turn = convention::turn(plane, normal);
-            let weight = angles[corner] * uv_sine(uvs, triangle, corner);
-            let sum = &mut sums[vertex as usize][side];
-            sum.dpdu += weight * (turn * frame.dpdu);
-            sum.dpdv += weight * (turn * frame.dpdv);
-            sum.weight += weight;
-        }
-    }
+    let sums = means(surface, |_, frame, plane, normal| {
+        let turn = convention::turn(plane, normal);
+        FaceFrame { dpdu: turn * frame.dpdu, dpdv: turn * frame.dpdv }
+    });
     let mut result = Derivatives {
         dpdu: Vec::with_capacity(positions.len()),
         dpdv: Vec::with_capacity(positions.len()),
@@ -65,8 +53,7 @@ pub fn derivatives(
     let mut used = vec![false; positions.len()];
     indices.iter().flatten().for_each(|&i| used[i as usize] = true);
     let mut replaced = 0usize;
-    for (vertex, [a, b]) in sums.iter().enumerate() {
-        let sum = if a.weight > b.weight { a } else { b };
+    for (vertex, sum) in sums.iter().enumerate() {
         let (dpdu, dpdv) = ((sum.dpdu / sum.weight).as_vec3(), (sum.dpdv / sum.weight).as_vec3());
         if sum.weight > 0.0 && sound(dpdu) && sound(dpdv) {
             result.dpdu.push(dpdu);
@@ -83,6 +70,50 @@ pub fn derivatives(
         ));
     }
     result
+}
+
+/// `dN/du` and `dN/dv` at each vertex of a checked mesh, per UV unit, perpendicular to the normal; zero at
+/// vertices without any sound UV triangle.
+///
+/// The smooth normals change linearly over each triangle; the vertices get means as for [`derivatives`].
+pub fn normal_derivatives(
+    positions: &[Vec3],
+    normals: &[Vec3],
+    uvs: &[Vec2],
+    indices: &[[u32; 3]],
+) -> [Vec<Vec3>; 2] {
+    let surface = Surface { positions, normals, uvs, indices, quads: &[] };
+    let still = FaceFrame { dpdu: DVec3::ZERO, dpdv: DVec3::ZERO };
+    let sums = means(surface, |face, _, _, normal| {
+        let corners = indices[face].map(|i| i as usize);
+        let turning = face_frame(corners.map(|i| normals[i].as_dvec3()), corners.map(|i| uvs[i].as_dvec2()));
+        let FaceFrame { dpdu, dpdv } = turning.unwrap_or(still);
+        FaceFrame { dpdu: dpdu - normal * normal.dot(dpdu), dpdv: dpdv - normal * normal.dot(dpdv) }
+    });
+    let finite = |v: DVec3| if v.as_vec3().is_finite() { v.as_vec3() } else { Vec3::ZERO };
+    let along = |pick: fn(&Sum) -> DVec3| sums.iter().map(|sum| finite(pick(sum) / sum.weight)).collect();
+    [along(|sum| sum.dpdu), along(|sum| sum.dpdv)]
+}
+
+/// Weighted sums over the triangles of each vertex, of the heavier side of a mirror. `carry` takes a
+/// triangle, its frame, the normal of its plane and the vertex normal to what counts at the vertex.
+fn means(surface: Surface<'_>, carry: impl Fn(usize, FaceFrame, DVec3, DVec3) -> FaceFrame) -> Vec<Sum> {
+    let mut sums = vec![[Sum::default(); 2]; surface.positions.len()];
+    for (face, triangle) in surface.indices.iter().enumerate() {
+        let plane = face_normal(surface.positions, triangle);
+        let Some(frame) = surface.face_frame(face).filter(|_| plane != DVec3::ZERO) else { continue };
+        let side = usize::from(frame.dpdu.cross(frame.dpdv).dot(plane) > 0.0);
+        let angles = corner_angles(surface.positions, triangle);
+        for (corner, &vertex) in triangle.iter().enumerate() {
+            let value = carry(face, frame, plane, surface.normals[vertex as usize].as_dvec3());
+            let weight = angles[corner] * uv_sine(surface.uvs, triangle, corner);
+            let sum = &mut sums[vertex as usize][side];
+            sum.dpdu += weight * value.dpdu;
+            sum.dpdv += weight * value.dpdv;
+            sum.weight += weight;
+        }
+    }
+    sums.into_iter().map(|[a, b]| if a.weight > b.weight { a } else { b }).collect()
 }
 
 fn sound(v: Vec3) -> bool {

@@ -25,7 +25,7 @@ use crate::error::MeshError;
 pub use alone::{quads_of_triangles, tangents_of_arrays, triangles_of_quads};
 pub use dietrich::{FaceFrame, face_frame};
 pub use join::Split;
-pub use metric::{Derivatives, derivatives};
+pub use metric::{Derivatives, derivatives, normal_derivatives};
 
 /// What a file of this folder says of its method.
 #[derive(Debug)]

@@ -66,6 +66,8 @@ impl Mesh {
             position: centre + right * (u - 0.5) + down * (v - 0.5),
             dpdu: right,
             dpdv: down,
+            dndu: DVec3::ZERO,
+            dndv: DVec3::ZERO,
             along: right.normalize(),
             normal,
         };

@@ -11,6 +11,10 @@ pub struct SurfacePoint {
     pub dpdu: DVec3,
     /// `dP/dv`, mesh units per UV unit.
     pub dpdv: DVec3,
+    /// `dN/du`, per UV unit.
+    pub dndu: DVec3,
+    /// `dN/dv`, per UV unit.
+    pub dndv: DVec3,
     /// Unit vector along growing `u`; at a pole, its limit along the meridian.
     pub along: DVec3,
     /// Outward unit normal.

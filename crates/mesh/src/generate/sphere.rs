@@ -14,10 +14,14 @@ pub fn sphere_point(radius: f64, u: f64, v: f64) -> SurfacePoint {
     let ((sin_lon, cos_lon), (sin_lat, cos_lat)) = ((TAU * (u - 0.5)).sin_cos(), (PI * v).sin_cos());
     let along = DVec3::new(cos_lon, 0.0, -sin_lon);
     let normal = DVec3::new(sin_lat * sin_lon, cos_lat, sin_lat * cos_lon);
+    let dndu = TAU * sin_lat * along;
+    let dndv = PI * DVec3::new(cos_lat * sin_lon, -sin_lat, cos_lat * cos_lon);
     SurfacePoint {
         position: radius * normal,
-        dpdu: TAU * radius * sin_lat * along,
-        dpdv: PI * radius * DVec3::new(cos_lat * sin_lon, -sin_lat, cos_lat * cos_lon),
+        dpdu: radius * dndu,
+        dpdv: radius * dndv,
+        dndu,
+        dndv,
         along,
         normal,
     }

@@ -15,10 +15,13 @@ pub fn torus_point(major: f64, minor: f64, u: f64, v: f64) -> SurfacePoint {
     let ring = major + minor * cos_v;
     let along = DVec3::new(cos_u, 0.0, -sin_u);
     let normal = DVec3::new(cos_v * sin_u, sin_v, cos_v * cos_u);
+    let dndv = TAU * DVec3::new(sin_v * sin_u, -cos_v, sin_v * cos_u);
     SurfacePoint {
         position: DVec3::new(ring * sin_u, minor * sin_v, ring * cos_u),
         dpdu: TAU * ring * along,
-        dpdv: TAU * minor * DVec3::new(sin_v * sin_u, -cos_v, sin_v * cos_u),
+        dpdv: minor * dndv,
+        dndu: TAU * cos_v * along,
+        dndv,
         along,
         normal,
     }

@@ -1,17 +1,13 @@
-//! The normal bent by the heights as they are read. Twin of `shaders_wgsl/surface/bump.wgsl`.
+//! The normal bent by the heights as they are read, in axes at any angle. Twin of `shaders_wgsl/surface/bump.wgsl`.
 //!
 //! Source: Blinn, "Simulation of Wrinkled Surfaces", SIGGRAPH 1978.
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2};
 use heightfield::HeightField;
 
-use super::{SurfaceFrame, perturb_by_slope};
+use super::{SurfaceFrame, central_slope, perturb_general};
 
-/// The shading normal at `uv`, from heights `reach` (in uv, at least a texel) to each side.
-pub fn bump(field: &HeightField, surface: &SurfaceFrame, uv: Vec2, reach: Vec2) -> Vec3 {
-    let rise = Vec2::new(
-        field.sample(uv.x + reach.x, uv.y) - field.sample(uv.x - reach.x, uv.y),
-        field.sample(uv.x, uv.y + reach.y) - field.sample(uv.x, uv.y - reach.y),
-    );
-    perturb_by_slope(surface, field.extent().scale * rise / (2.0 * reach))
+/// The shading normal at `uv`, from heights read `reach` (in uv, at least a texel) away.
+pub fn bump(field: &HeightField, surface: &SurfaceFrame, uv: Vec2, reach: Vec2) -> DVec3 {
+    perturb_general(surface, central_slope(field, uv, reach))
 }

@@ -1,0 +1,11 @@
+// Slopes baked from the heights, with mipmaps, in mesh units a tile along u and v.
+#import "bindings/material.wgsl"
+#import "bindings/slopes.wgsl"
+#import "lib/slope_wrap.wgsl"
+#import "lib/surface_point.wgsl"
+
+fn baked_slope(point: SurfacePoint) -> vec2f {
+    let slope = textureSampleGrad(slope_texture, slope_sampler, point.uv, point.uv_dx, point.uv_dy).xy;
+    let factor = slope_factor(point.uv, vec2f(material.map_width, material.map_height), material.wrap);
+    return slope * factor * material.scale;
+}
