@@ -10,7 +10,7 @@ Examples
 >>> bw.techniques.Relief(linear=16)
 Relief(linear=16, refine=8)
 >>> bw.techniques.names()[:3]
-('flat', 'bump', 'normal')
+('flat', 'bump_forward', 'bump')
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Technique:
     summary : str
         What it does, in one line.
     source : str
-        The work it comes from; empty for shading techniques, whose summary names it.
+        The work it comes from; empty where there is none to name.
     parameters : dict of str to int
         The values of this object.
     """

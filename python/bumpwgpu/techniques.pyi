@@ -5,6 +5,11 @@ from typing import Any, ClassVar, NamedTuple
 __all__ = [
     "Binary",
     "Bump",
+    "BumpBlinn",
+    "BumpDerivative",
+    "BumpExact",
+    "BumpForward",
+    "BumpOrthogonal",
     "Dot3",
     "Exact",
     "Flat",
@@ -51,6 +56,21 @@ class Flat(Technique):
     def __init__(self) -> None: ...
 
 class Bump(Technique):
+    def __init__(self) -> None: ...
+
+class BumpForward(Technique):
+    def __init__(self) -> None: ...
+
+class BumpOrthogonal(Technique):
+    def __init__(self) -> None: ...
+
+class BumpDerivative(Technique):
+    def __init__(self) -> None: ...
+
+class BumpBlinn(Technique):
+    def __init__(self) -> None: ...
+
+class BumpExact(Technique):
     def __init__(self) -> None: ...
 
 class Normal(Technique):

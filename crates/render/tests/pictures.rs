@@ -123,7 +123,12 @@ fn mirrored_charts_and_transforms_keep_light_and_relief_in_place() {
         for (name, frame) in [("chart", chart), ("transform", transform)] {
             // The dome is symmetric, so all pictures are the same but for rounding at its rim.
             let differing = plain.color.iter().zip(&frame.color).filter(|(a, b)| a.abs_diff(**b) > 6).count();
-            assert!(differing < plain.color.len() / 60, "{technique}, mirrored {name}: {differing} differ");
+            // Forward differences look half a texel to the right, in the mirror to the left.
+            let share = if technique == "bump_forward" { 20 } else { 60 };
+            assert!(
+                differing < plain.color.len() / share,
+                "{technique}, mirrored {name}: {differing} differ"
+            );
             assert_eq!(plain.stats.pixels_covered, frame.stats.pixels_covered, "{technique} {name}");
         }
     }

@@ -32,8 +32,10 @@ impl Mesh {
     ///
     /// An equirectangular map: north (`v = 0`) is +Y, the middle of the map faces +Z, `u` grows to
     /// the right seen from outside; the seam is at -Z. Each triangle at a pole has a pole vertex of
-    /// its own in the middle of its `u` range; `dP/du` is zero there, as it is on the true sphere,
-    /// while the tangent is the limit along the meridian.
+    /// its own in the middle of its `u` range. There the tangent is the limit along the meridian, and
+    /// `dP/du`, which vanishes on the true sphere, is that of the triangle: the map is drawn on the
+    /// triangle with that scale throughout, and a frame that shrinks towards the pole would have rays
+    /// run around it without end.
     ///
     /// # Errors
     /// [`MeshError::Parameter`] for a radius that is not positive or segments outside 3..=2048.
@@ -69,9 +71,11 @@ impl Mesh {
         for column in 0..columns {
             mesh.indices.push([last + column, first_pole + columns + column, last + column + 1]);
         }
-        // The poles' sines are not quite zero in floating point.
+        let ring = sphere_point(radius, 0.5, dv).dpdu.length();
+        // The chord over the arc.
+        let length = ring * (PI * du).sin() / (PI * du);
         for vertex in first_pole as usize..mesh.dpdu.len() {
-            mesh.dpdu[vertex] = glam::Vec3::ZERO;
+            mesh.dpdu[vertex] = mesh.tangents[vertex].truncate() * length as f32;
         }
         Ok(mesh.named("sphere"))
     }
