@@ -53,9 +53,10 @@ impl TechniqueChoice {
         matches!(self, Self::Search(technique) if technique.info.casts_shadows)
     }
 
-    /// Whether a horizon map can shadow it: it has a relief and more than one fixed-function light.
+    /// Whether a horizon map can shadow it: it has a relief, the axes of the texture mapping, and more than
+    /// one fixed-function light.
     pub fn takes_horizon(&self) -> bool {
-        !matches!(self, Self::Flat | Self::Dot3)
+        !matches!(self, Self::Plain(plain) if ["plain", "dot3"].contains(&plain.entry))
     }
 
     /// The shader files it is made of. `own_normals`: the material has a normal map.
