@@ -1,6 +1,10 @@
-// Group 1 of the exact search: corner heights and the max pyramid over the cells.
+// Group 1 of the exact search: the height texture, never filtered, and the skip pyramid over its cells.
 #import "lib/height_info.wgsl"
 
-@group(1) @binding(0) var<storage, read> corners: array<f32>;
-@group(1) @binding(1) var<storage, read> pyramid: array<f32>;
+@group(1) @binding(0) var height_texture: texture_2d<f32>;
+@group(1) @binding(1) var height_sampler: sampler;
 @group(1) @binding(2) var<uniform> height_info: HeightInfo;
+@group(1) @binding(3) var<storage, read> pyramid: array<f32>;
+
+// Whether the cells at the border go on for ever (clamp) instead of around it (repeat, mirror).
+override endless: bool = false;

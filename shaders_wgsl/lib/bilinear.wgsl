@@ -1,49 +1,43 @@
-// A ray against one bilinear cell. Twin of `first_root` in crates/heightfield/src/search/exact.rs.
+// A ray against one bilinear cell: one quadratic. Ramsey, Potter and Hansen, Journal of Graphics Tools
+// 9(3), 2004. Twin of `first_root` in crates/heightfield/src/search/exact.rs.
 
-// Height of the patch at `local`, 0..1 along x and y. heights: h00, h10, h01, h11 (first digit along x).
-fn bilinear_height(heights: vec4f, local: vec2f) -> f32 {
-    let along = vec2f(heights.y - heights.x, heights.z - heights.x);
-    let twist = (heights.w - heights.y) - (heights.z - heights.x);
-    return heights.x + local.x * along.x + local.y * (along.y + local.x * twist);
+// Part of a height, or of a distance along the ray, that rounding may take: one ulp.
+const ROUNDING: f32 = 1.2e-7;
+
+// A ray inside one cell: its height above the patch is gap + s * (slope + s * bend).
+struct CellRay {
+    gap: f32,
+    slope: f32,
+    bend: f32,
+    // How far rounding may be off in gap.
+    rounding: f32,
 }
 
-// First `s` in 0..length where the ray is on or below the patch, or -1.
-//
-// local: where the ray enters; gap: its height above the patch there; direction: cells and height for
-// one unit of s. With on_surface the start is itself a root and only the other one counts.
-fn bilinear_root(heights: vec4f, local: vec2f, gap: f32, direction: vec3f, length: f32, on_surface: bool) -> f32 {
+// heights: h00, h10, h01, h11 (first digit along x); local: where the ray enters, 0..1; z: its height
+// there; t: its parameter there; direction: cells and height for one unit of it.
+fn cell_ray(heights: vec4f, local: vec2f, z: f32, t: f32, direction: vec3f) -> CellRay {
     let along = vec2f(heights.y - heights.x, heights.z - heights.x);
-    let twist = (heights.w - heights.y) - (heights.z - heights.x);
-    let slope = direction.z - (along.x + local.y * twist) * direction.x - (along.y + local.x * twist) * direction.y;
-    let bend = -twist * direction.x * direction.y;
-    if on_surface {
-        if slope < 0.0 || (slope == 0.0 && bend < 0.0) {
-            return 0.0;
-        }
-        if bend < 0.0 && slope <= -bend * length {
-            return -slope / bend;
-        }
-        return -1.0;
-    }
-    if gap <= 0.0 {
-        return 0.0;
-    }
-    var root = -1.0;
-    if bend == 0.0 {
-        if slope < 0.0 {
-            root = -gap / slope;
-        }
-    } else {
-        let discriminant = slope * slope - 4.0 * bend * gap;
-        if discriminant >= 0.0 {
-            let square_root = sqrt(discriminant);
-            let q = 0.5 * select(square_root - slope, -(slope + square_root), slope >= 0.0);
-            if q > 0.0 {
-                root = gap / q;
-            } else if q < 0.0 && bend < 0.0 {
-                root = q / bend;
-            }
-        }
-    }
-    return select(-1.0, root, root <= length);
+    let twist = (heights.w - heights.y) - along.y;
+    let rise_x = (along.x + local.y * twist) * direction.x;
+    let rise_y = (along.y + local.x * twist) * direction.y;
+    let height = heights.x + local.x * (along.x + local.y * twist) + local.y * along.y;
+    var ray: CellRay;
+    ray.gap = z - height;
+    ray.slope = direction.z - rise_x - rise_y;
+    ray.bend = -twist * direction.x * direction.y;
+    ray.rounding = ROUNDING * (1.0 + t * (abs(rise_x) + abs(rise_y)));
+    return ray;
+}
+
+// First s in 0..length where the ray is on or below the patch, or -1. A ray that comes closer to the
+// patch than rounding can tell touches it.
+fn cell_root(ray: CellRay, length: f32) -> f32 {
+    let discriminant = ray.slope * ray.slope - 4.0 * ray.bend * ray.gap;
+    let root = sqrt(max(discriminant, 0.0));
+    let leaving = ray.slope > 0.0;
+    let numerator = select(2.0 * ray.gap, ray.slope + root, leaving);
+    let denominator = select(root - ray.slope, -2.0 * ray.bend, leaving);
+    let s = numerator / select(1.0, denominator, denominator > 0.0);
+    let touches = discriminant + 4.0 * ray.bend * ray.rounding >= 0.0 && denominator > 0.0 && s <= length;
+    return select(-1.0, s, touches);
 }

@@ -11,14 +11,17 @@ struct HeightInfo {
     tile_size: vec2f,
     // 0 repeat, 1 clamp, 2 mirror.
     wrap: u32,
-    // Levels of the max pyramid.
-    level_count: u32,
-    // Cells along x and y; one row and column of corners more.
+    // Finest depth of the skip pyramid.
+    deepest: u32,
+    // Cells along x and y of one period.
     cells: vec2u,
+    // Depths at which the skip pyramid is still one node wide along x and y.
+    lags: vec2u,
     // Texel at the lower side of cell 0: 0, or -1 for clamp.
     first_texel: i32,
     // Highest corner of the map.
     highest: f32,
-    // For each level: nodes along x and y, where it starts in the pyramid buffer, unused.
-    levels: array<vec4u, 18>,
+    // A depth of n nodes starts at offset_bits & (n - 1) in the skip pyramid.
+    offset_bits: u32,
+    unused: u32,
 }

@@ -1,101 +1,156 @@
-// Exact search: descends a max pyramid only into nodes the ray can hit and solves the bilinear cell in
-// closed form. Musgrave 1988; Tevs, Ihrke and Seidel 2008; Ramsey, Potter and Hansen 2004.
+// Exact search: skips empty space with the maxima of ever larger blocks of cells and solves the bilinear
+// cell in closed form. Musgrave 1988; Tevs, Ihrke and Seidel 2008; Ramsey, Potter and Hansen 2004.
 //
-// Cells and nodes are integers throughout; a ray that enters a cell on or below its surface hits it
-// there, which closes the seam that rounding leaves between neighbouring cells.
+// The maxima hold half a cell around their nodes too (crates/heightfield/src/skip_pyramid.rs), so nodes
+// come from rounded positions and each step ends an eighth of a cell beyond its node. Cells are walked by
+// id; a ray that enters one on or below its surface hits it there, which closes the seam that rounding
+// leaves between neighbours. There are no branches: lanes in lock step would all pay for each.
 //
 // start, delta: texture-space segment (u, v, z); cos_theta: cosine between ray and normal.
-// Twin of crates/heightfield/src/search/exact.rs.
+// Gives the answers of crates/heightfield/src/search/exact.rs.
 #import "lib/found.wgsl"
 #import "lib/bilinear.wgsl"
-#import "lib/grid_axis.wgsl"
+#import "lib/ray_end.wgsl"
 #import "bindings/pyramid.wgsl"
 
+// Mesa's software device ends all loops of a program after 65535 rounds, whatever state they are in.
 const MAX_STEPS: u32 = 16384u;
+// Where most searches from the lid begin: 16 nodes across the longer side.
+const FIRST_DEPTH: i32 = 4;
+// Cells that a step goes beyond its node.
+const BEYOND: f32 = 0.125;
 // Farther from the surface than this, a start is not on it.
 const ON_SURFACE: f32 = 1e-3;
-// Rounding of a height: 8 ulps of 1.
-const ROUNDING: f32 = 9.5e-7;
+// Adding 1.5 * 2^23 leaves a whole number below 2^22 in the low bits.
+const TO_BITS: f32 = 12582912.0;
 
-// The four corner heights of a cell, the first at index `at`.
-fn bilinear_cell(at: u32) -> vec4f {
-    let below = at + height_info.cells.x + 1u;
-    return vec4f(corners[at], corners[at + 1u], corners[below], corners[below + 1u]);
+// Corner heights of the cell whose lower corner is texel `cell`: h00, h10, h01, h11.
+fn corners_of(cell: vec2f) -> vec4f {
+    return textureGather(0, height_texture, height_sampler, (cell + 1.0) / height_info.size).wzxy;
+}
+
+// The highest point of the surface around a node, of 2^bits along x and y. raw: its ids in the low bits.
+fn maximum_of(raw: vec2i, bits: vec2i, offset_bits: i32) -> f32 {
+    let last = (vec2i(1) << vec2u(bits)) - 1;
+    let id = raw & last;
+    let offset = offset_bits & ((1 << u32(bits.x + bits.y)) - 1);
+    return pyramid[offset + (id.y << u32(bits.x)) + id.x];
 }
 
 fn trace(start: vec3f, delta: vec3f, from_surface: bool) -> Found {
-    let periodic = height_info.wrap != 1u;
-    let position = start.xy * height_info.size - 0.5 - f32(height_info.first_texel);
-    let direction = vec3f(delta.xy * height_info.size, delta.z);
-    let dz = direction.z;
-    var x = axis_new(position.x, direction.x, height_info.cells.x, periodic);
-    var y = axis_new(position.y, direction.y, height_info.cells.y, periodic);
-    if dz >= 0.0 && start.z > height_info.highest {
-        return found_left(0u);
-    }
-    let period = 2 * vec2i(height_info.cells);
-    let flat_period = dz == 0.0 && periodic && (x.inverse == 0.0 || y.inverse == 0.0);
-    let top = height_info.level_count - 1u;
-    var level = select(top, 0u, from_surface);
-    x.node >>= level;
-    y.node >>= level;
-    var t = 0.0;
+    let period = vec2f(height_info.cells);
+    let place = start.xy * height_info.size - 0.5;
+    let first_cell = floor(place);
+    let local_start = place - first_cell;
+    let origin = place - f32(height_info.first_texel);
+    // The cells at the borders, as ids from the first of this ray.
+    let first = f32(height_info.first_texel) - first_cell;
+    let last = first + period - 1.0;
+    let direction = delta.xy * height_info.size;
+    let moves = abs(direction) > vec2f(1e-20);
+    let inverse = select(vec2f(0.0), 1.0 / select(vec2f(1.0), direction, moves), moves);
+    let still = select(vec2f(FAR), vec2f(0.0), moves);
+    let ahead = direction > vec2f(0.0);
+    let side = select(vec2f(0.0), vec2f(1.0), ahead);
+    let toward = 2.0 * side - 1.0;
+    // The same in shares of the period, for the nodes.
+    let share = origin / period;
+    let share_step = direction / period;
+    let share_time = inverse * period;
+    let node_time = (toward * BEYOND - origin) * inverse + still;
+
+    let dz = select(0.0, delta.z, abs(delta.z) > 1e-30);
+    let sinks = dz < 0.0;
+    // When the ray comes down to height 0 from height 1; 0 when it does not come down.
+    let fall = select(0.0, 1.0 / select(-1.0, dz, sinks), sinks);
     var z_start = start.z;
-    var first = from_surface;
-    for (var steps = 1u; steps <= MAX_STEPS; steps++) {
-        let nodes = height_info.levels[level];
-        let maximum = pyramid[nodes.z + y.node * nodes.x + x.node];
-        let exit_x = axis_exit(x, level);
-        let exit_y = axis_exit(y, level);
-        let exit = min(exit_x, exit_y);
-        let lowest = z_start + dz * select(t, exit, dz < 0.0);
-        if lowest <= maximum {
-            if level > 0u {
-                if dz < 0.0 {
-                    t = min(max(t, (maximum - z_start) / dz), exit);
-                }
-                x = axis_descend(x, level, t);
-                y = axis_descend(y, level, t);
-                level -= 1u;
-                continue;
+    var end = ray_end(origin, inverse, moves, z_start, dz, height_info.highest, period, endless);
+    let deepest = i32(height_info.deepest);
+    let lags = vec2i(height_info.lags);
+    let offset_bits = i32(height_info.offset_bits);
+    var depth = min(deepest, FIRST_DEPTH);
+    if from_surface {
+        let gap = cell_ray(corners_of(first_cell), local_start, z_start, 0.0, vec3f(direction, dz)).gap;
+        z_start -= select(0.0, gap, abs(gap) <= ON_SURFACE);
+        end = min(end, 1.0);
+        depth = deepest;
+    }
+    // Nodes are left out only when the ray clears them by more than rounding.
+    let z_skip = z_start - ROUNDING;
+    var t = max(0.0, (height_info.highest - z_skip) * fall);
+    var hit = false;
+    var steps = 0u;
+    loop {
+        // Down and along the nodes until one of the finest may hold a hit.
+        var exit = 0.0;
+        var cleared = true;
+        loop {
+            let bits = max(depth - lags, vec2i(0));
+            let nodes = bitcast<vec2f>((127 + bits) << vec2u(23u));
+            let size = bitcast<vec2f>((127 - bits) << vec2u(23u));
+            var node = floor((share + share_step * t) * nodes);
+            if endless {
+                node = clamp(node, vec2f(0.0), nodes - 1.0);
             }
-            let cell = bilinear_cell(y.node * (height_info.cells.x + 1u) + x.node);
-            let local = vec2f(axis_local(x, t, direction.x), axis_local(y, t, direction.y));
-            var gap = z_start + dz * t - bilinear_height(cell, local);
-            if first && abs(gap) <= ON_SURFACE {
-                z_start -= gap;
-                gap = 0.0;
+            var exits = (node + side) * (size * share_time) + node_time;
+            if endless {
+                exits = past_border(exits, node, vec2f(0.0), nodes - 1.0, ahead);
             }
+            let id = bitcast<vec2i>(node + TO_BITS);
+            let along_x = exits.x < exits.y;
+            exit = select(exits.y, exits.x, along_x);
+            let maximum = maximum_of(id, bits, offset_bits);
+            cleared = z_skip + dz * select(t, exit, sinks) > maximum;
+            // Ascend only across a border of the parent.
+            let last_child = ((id & vec2i(1)) != vec2i(0)) == ahead;
+            let ascends = select(last_child.y, last_child.x, along_x) && depth > 0;
+            let at_cell = !cleared && depth == deepest;
+            let sunk = (maximum - z_skip) * fall;
+            t = select(select(t, sunk, sunk > t), exit, cleared);
+            depth += select(select(1, 0, at_cell), select(0, -1, ascends), cleared);
+            steps++;
+            if at_cell || t >= end || steps >= MAX_STEPS {
+                break;
+            }
+        }
+        // Along the cells to the far side of that node.
+        var cell = floor(local_start + direction * t);
+        if endless {
+            cell = clamp(cell, first, last);
+        }
+        loop {
+            var exits = (cell + side - local_start) * inverse + still;
+            if endless {
+                exits = past_border(exits, cell, first, last, ahead);
+            }
+            let along_x = exits.x < exits.y;
+            let cell_exit = select(exits.y, exits.x, along_x);
+            let local = clamp(local_start - cell + direction * t, vec2f(0.0), vec2f(1.0));
+            var ray = cell_ray(corners_of(first_cell + cell), local, z_start + dz * t, t, vec3f(direction, dz));
             // A light ray that enters a cell on the surface still leaves the point it started from.
-            let on_surface = from_surface && abs(gap) <= ROUNDING;
-            let s = bilinear_root(cell, local, gap, direction, exit - t, on_surface);
-            if s >= 0.0 {
-                return found_hit(t + s, steps);
+            let inside = ray.gap <= select(ray.rounding, -ray.rounding, from_surface);
+            ray.gap = max(ray.gap, 0.0);
+            let s = select(cell_root(ray, cell_exit - t), 0.0, inside);
+            hit = !cleared && s >= 0.0;
+            t = select(select(t, cell_exit, cell_exit > t && !cleared), t + s, hit);
+            cell += select(vec2f(0.0, toward.y), vec2f(toward.x, 0.0), along_x);
+            steps++;
+            if hit || cleared || cell_exit >= exit || steps >= MAX_STEPS {
+                break;
             }
         }
-        first = false;
-        t = max(t, exit);
-        if t >= FAR || (dz > 0.0 && z_start + dz * t > height_info.highest) {
-            return found_left(steps);
-        }
-        var crossed: bool;
-        if exit_x <= exit_y {
-            crossed = axis_crosses_parent(x);
-            x = axis_advance(x, nodes.x);
-        } else {
-            crossed = axis_crosses_parent(y);
-            y = axis_advance(y, nodes.y);
-        }
-        if crossed && level < top {
-            level += 1u;
-            x.node /= 2u;
-            y.node /= 2u;
-        }
-        if flat_period && (abs(x.tile) > period.x || abs(y.tile) > period.y) {
-            return found_left(steps);
+        if hit || t >= end || steps >= MAX_STEPS {
+            break;
         }
     }
-    return found_unconverged(t, MAX_STEPS);
+    // What lies beyond the light throws no shadow.
+    if hit && (t <= end || !from_surface) {
+        return found_hit(t, steps);
+    }
+    if steps >= MAX_STEPS {
+        return found_unconverged(t, steps);
+    }
+    return found_left(steps);
 }
 
 fn search(start: vec3f, delta: vec3f, cos_theta: f32) -> Found {

@@ -7,7 +7,7 @@ use heightfield::HeightField;
 use heightfield::technique::Reads;
 
 use crate::texture::{MipLevel, sampler, upload};
-use crate::uniforms::{HeightInfo, MAX_LEVELS, wrap_code};
+use crate::uniforms::{HeightInfo, wrap_code};
 use crate::uploads::{Kind, Resource};
 use crate::{Device, RenderError};
 
@@ -25,12 +25,11 @@ pub fn height_info(field: &HeightField, with_pyramid: bool) -> HeightInfo {
         ..HeightInfo::zeroed()
     };
     if with_pyramid {
-        let pyramid = field.pyramid();
-        info.highest = pyramid.highest();
-        info.level_count = pyramid.levels().len().min(MAX_LEVELS) as u32;
-        for (out, level) in info.levels.iter_mut().zip(pyramid.levels()) {
-            *out = [level.nodes[0] as u32, level.nodes[1] as u32, level.offset as u32, 0];
-        }
+        let pyramid = field.skip_pyramid();
+        info.highest = pyramid.at(0, 0, 0);
+        info.deepest = pyramid.deepest();
+        info.lags = pyramid.lags();
+        info.offset_bits = pyramid.offset_bits();
     }
     info
 }
@@ -68,44 +67,34 @@ impl Device {
             bytemuck::bytes_of(&height_info(field, reads == Reads::Pyramid)),
             wgpu::BufferUsages::UNIFORM,
         )?;
-        match reads {
-            Reads::Heights => {
-                let level = MipLevel {
-                    size: [field.width(), field.height()],
-                    bytes: bytemuck::cast_slice(&field.texels()).to_vec(),
-                };
-                let view = upload(self, "heights", wgpu::TextureFormat::R32Float, &[level], false)?;
-                let sampler = sampler(self, field.wrap(), !self.manual_bilinear);
-                self.guard("binding a height field", || {
-                    Ok(self.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                        label: Some("heights"),
-                        layout: &self.layouts.heights,
-                        entries: &[
-                            bind(0, wgpu::BindingResource::TextureView(&view)),
-                            bind(1, wgpu::BindingResource::Sampler(&sampler)),
-                            bind(2, info.as_entire_binding()),
-                        ],
-                    }))
-                })
-            }
+        let level = MipLevel {
+            size: [field.width(), field.height()],
+            bytes: bytemuck::cast_slice(&field.texels()).to_vec(),
+        };
+        let view = upload(self, "heights", wgpu::TextureFormat::R32Float, &[level], false)?;
+        let filtered = reads == Reads::Heights && !self.manual_bilinear;
+        let sampler = sampler(self, field.wrap(), filtered);
+        let mut entries = vec![
+            bind(0, wgpu::BindingResource::TextureView(&view)),
+            bind(1, wgpu::BindingResource::Sampler(&sampler)),
+            bind(2, info.as_entire_binding()),
+        ];
+        let (layout, maxima) = match reads {
+            Reads::Heights => (&self.layouts.heights, None),
             Reads::Pyramid => {
-                let storage = wgpu::BufferUsages::STORAGE;
-                let corners = self.buffer_with("corners", bytemuck::cast_slice(field.corners()), storage)?;
-                let maxima = bytemuck::cast_slice(field.pyramid().maxima());
-                let pyramid = self.buffer_with("pyramid", maxima, storage)?;
-                self.guard("binding a height field", || {
-                    Ok(self.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                        label: Some("pyramid"),
-                        layout: &self.layouts.pyramid,
-                        entries: &[
-                            bind(0, corners.as_entire_binding()),
-                            bind(1, pyramid.as_entire_binding()),
-                            bind(2, info.as_entire_binding()),
-                        ],
-                    }))
-                })
+                let maxima = bytemuck::cast_slice(field.skip_pyramid().maxima());
+                let buffer = self.buffer_with("skip pyramid", maxima, wgpu::BufferUsages::STORAGE)?;
+                (&self.layouts.pyramid, Some(buffer))
             }
-        }
+        };
+        entries.extend(maxima.iter().map(|buffer| bind(3, buffer.as_entire_binding())));
+        self.guard("binding a height field", || {
+            Ok(self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("heights"),
+                layout,
+                entries: &entries,
+            }))
+        })
     }
 
     /// A new buffer.

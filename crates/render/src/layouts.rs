@@ -22,7 +22,7 @@ pub struct Layouts {
     pub frame: BindGroupLayout,
     /// Group 1: heights through a sampler.
     pub heights: BindGroupLayout,
-    /// Group 1: corners and pyramid.
+    /// Group 1: heights without filtering, and the skip pyramid.
     pub pyramid: BindGroupLayout,
     /// Group 3.
     pub draw: BindGroupLayout,
@@ -73,7 +73,12 @@ impl Layouts {
             ),
             pyramid: make(
                 "pyramid",
-                &[entry(0, seen, storage(true)), entry(1, seen, storage(true)), entry(2, seen, uniform())],
+                &[
+                    entry(0, seen, texture(false, TextureViewDimension::D2)),
+                    entry(1, seen, BindingType::Sampler(SamplerBindingType::NonFiltering)),
+                    entry(2, seen, uniform()),
+                    entry(3, seen, storage(true)),
+                ],
             ),
             draw: make("draw", &[entry(0, ShaderStages::VERTEX_FRAGMENT, uniform())]),
             march: make(

@@ -1,6 +1,7 @@
 //! Rays in texture space on the device: the parity tests, the benches and `march(device="gpu")`.
 
 use heightfield::march::{period, texture_space_normal, validate};
+use heightfield::technique::Reads;
 use heightfield::{HeightField, Hits, RayArray, Segment, Status, Technique};
 use rayon::prelude::*;
 
@@ -71,7 +72,9 @@ pub fn march(
             let Some(segment) = &clips[i] else { return };
             let result = results[i];
             *steps = result.steps;
-            let open = result.status == Status::Left as u32 && !segment.closed;
+            // Only the exact search goes on beyond the segment of a level ray, which has no end.
+            let ends = segment.closed || technique.info.reads == Reads::Pyramid;
+            let open = result.status == Status::Left as u32 && !ends;
             *status = if open { Status::Unconverged as u8 } else { result.status as u8 };
             if result.status != Status::Hit as u32 {
                 return;
@@ -141,7 +144,7 @@ fn run(
     }
     let reads = technique.info.reads;
     let group = device.make_field_group(field, reads)?;
-    let mut constants = constants_of(technique);
+    let mut constants = constants_of(technique, field);
     constants.push(("shadow_rays", i64::from(question == Question::Blocked)));
     let pipeline = device.pipeline(PipelineKey {
         program: Program {

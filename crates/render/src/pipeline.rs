@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use heightfield::Technique;
 use heightfield::technique::Reads;
+use heightfield::{HeightField, Technique};
 
 use crate::device::lock;
 use crate::request::Program;
@@ -74,9 +74,13 @@ pub(crate) fn reads_of(technique: &TechniqueChoice) -> Option<Reads> {
     }
 }
 
-/// Values of a search's own override constants.
-pub(crate) fn constants_of(technique: &Technique) -> Vec<(&'static str, i64)> {
-    technique.settings().map(|(name, value)| (name, value as i64)).collect()
+/// Values of the override constants of a search over a field.
+pub(crate) fn constants_of(technique: &Technique, field: &HeightField) -> Vec<(&'static str, i64)> {
+    let mut constants: Vec<_> = technique.settings().map(|(name, value)| (name, value as i64)).collect();
+    if technique.info.reads == Reads::Pyramid {
+        constants.push(("endless", i64::from(!field.is_periodic())));
+    }
+    constants
 }
 
 impl Device {

@@ -90,7 +90,7 @@ pub(crate) fn draws(
 fn key(draw: &Draw<'_>, request: &Request, program: Program, shadows: bool) -> PipelineKey {
     let mut constants = Vec::new();
     if let TechniqueChoice::Search(technique) = &request.technique {
-        constants = constants_of(technique);
+        constants = constants_of(technique, &draw.material.field);
         if !program.horizon {
             constants.push(("cast_shadows", i64::from(shadows)));
         }

@@ -81,9 +81,6 @@ pub struct HorizonInfo {
     pub azimuths: u32,
 }
 
-/// Levels that [`HeightInfo`] has room for; enough for the longest side twice (mirrored).
-pub const MAX_LEVELS: usize = 18;
-
 /// Twin of `HeightInfo` in `shaders_wgsl/lib/height_info.wgsl`.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
@@ -98,16 +95,20 @@ pub struct HeightInfo {
     pub tile_size: [f32; 2],
     /// [`wrap_code`].
     pub wrap: u32,
-    /// Levels of the max pyramid.
-    pub level_count: u32,
-    /// Cells along x and y.
+    /// Finest depth of the skip pyramid.
+    pub deepest: u32,
+    /// Cells along x and y of one period.
     pub cells: [u32; 2],
+    /// Depths at which the skip pyramid is still one node wide.
+    pub lags: [u32; 2],
     /// Texel at the lower side of cell 0.
     pub first_texel: i32,
     /// Highest corner.
     pub highest: f32,
-    /// Nodes along x and y, offset, unused.
-    pub levels: [[u32; 4]; MAX_LEVELS],
+    /// A depth of `n` nodes starts at `offset_bits & (n - 1)`.
+    pub offset_bits: u32,
+    /// Padding.
+    pub unused: u32,
 }
 
 /// Twin of `MarchSegment` in `shaders_wgsl/kernels/march.wgsl`.

@@ -48,7 +48,7 @@ fn host_structs_match() {
         "MaterialInfo",
     );
     check(
-        layout!(HeightInfo: size, base, scale, tile_size, wrap, level_count, cells, first_texel, highest, levels),
+        layout!(HeightInfo: size, base, scale, tile_size, wrap, deepest, cells, lags, first_texel, highest, offset_bits, unused),
         &relief,
         "HeightInfo",
     );
