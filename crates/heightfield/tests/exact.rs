@@ -296,3 +296,15 @@ fn lit_points_do_not_shadow_themselves() {
     }
     assert_eq!(blocked, 0, "of 200000 lit points");
 }
+
+#[test]
+fn what_lies_beyond_the_light_throws_no_shadow() {
+    let exact = Technique::named("exact").unwrap();
+    let field = from_fn(64, 64, Wrap::Repeat, |i, _| if i == 48 { 1.0 } else { 0.25 });
+    let blocked = |lateral| {
+        let delta = glam::Vec3::new(lateral, 0.0, 0.5 * lateral);
+        exact.occluded(&field, glam::Vec3::new(0.25, 0.5, 0.25), delta, 1.0)
+    };
+    assert!(blocked(0.6), "the wall stands between the point and the light");
+    assert!(!blocked(0.4), "the wall stands behind the light");
+}

@@ -357,7 +357,9 @@ impl Search for Exact {
 
     #[inline(always)]
     fn occluded(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> bool {
-        Self::trace_f32(field, start, delta, true).status == Status::Hit
+        let hit = Self::trace_f32(field, start, delta, true);
+        // What lies beyond the light throws no shadow.
+        hit.status == Status::Hit && hit.t <= 1.0
     }
 
     #[inline(always)]
