@@ -73,11 +73,17 @@ struct Batch {
 }
 
 impl Batch {
-    fn new(map: &Map, kind: Kind, single: bool, count: usize, seed: u64) -> Self {
+    /// Rays that have nothing to do with each other, or that come in bundles as in a picture.
+    fn new(map: &Map, kind: Kind, single: bool, bundled: bool, count: usize, seed: u64) -> Self {
         let part = |part: usize| {
             let mut random = Random(seed ^ ((part as u64) << 40) ^ ((kind as u64) << 56));
             let length = count.min((part + 1) * 4096) - part * 4096;
-            (0..length).map(|_| kind.ray(&map.surface, &mut random, single)).collect::<Vec<_>>()
+            let mut rays: Vec<Ray> = Vec::with_capacity(length);
+            while rays.len() < length {
+                let bundle = if bundled { 1 << (random.next() * 8.0) as usize } else { 1 };
+                kind.bundle(&map.surface, &mut random, single, bundle.min(length - rays.len()), &mut rays);
+            }
+            rays
         };
         let rays = (0..count.div_ceil(4096)).into_par_iter().flat_map_iter(part).collect();
         Self { kind, single, rays }
@@ -122,12 +128,13 @@ impl Batch {
 
 /// About `rays` rays over these maps, all kinds and precisions.
 fn run(maps: &[Map], rays: usize, seed: u64, technique: &Technique) -> Tally {
-    let count = rays.div_ceil(maps.len() * KINDS.len() * 2);
+    let count = rays.div_ceil(maps.len() * KINDS.len() * 4);
     let mut total = Tally::default();
     for (at, map) in maps.iter().enumerate() {
         for kind in KINDS {
-            for single in [true, false] {
-                let batch = Batch::new(map, kind, single, count, seed.wrapping_mul(1009) + at as u64);
+            for (single, bundled) in [(true, true), (true, false), (false, true), (false, false)] {
+                let batch =
+                    Batch::new(map, kind, single, bundled, count, seed.wrapping_mul(1009) + at as u64);
                 total = total.add(batch.judge(map, &batch.answers(map, technique)));
             }
         }
@@ -177,7 +184,7 @@ fn telling() -> Vec<Map> {
 #[test]
 fn the_judge_convicts_what_is_wrong() {
     for map in telling() {
-        let batch = Batch::new(&map, Kind::View, true, 4000, 5);
+        let batch = Batch::new(&map, Kind::View, true, false, 4000, 5);
         let right = batch.answers(&map, &exact());
         let convicted = |answers: &[Answer], verdict| batch.judge(&map, answers).count(verdict);
         let relief = Technique::named("relief").unwrap().with("linear", 8.0).unwrap();
@@ -200,7 +207,7 @@ fn the_judge_convicts_what_is_wrong() {
 #[test]
 fn the_judge_convicts_wrong_shadows() {
     for map in telling() {
-        let batch = Batch::new(&map, Kind::Shadow, true, 4000, 6);
+        let batch = Batch::new(&map, Kind::Shadow, true, false, 4000, 6);
         let answers = |status, t| vec![Answer { status, t }; 4000];
         let lit = batch.judge(&map, &answers(1, f32::INFINITY));
         let dark = batch.judge(&map, &answers(0, 0.0));
@@ -213,7 +220,7 @@ fn the_judge_convicts_wrong_shadows() {
 fn the_walk_of_the_judge_agrees_with_bisection() {
     for map in WRAPS.into_iter().flat_map(maps) {
         for kind in [Kind::View, Kind::Borders, Kind::Between] {
-            for (origin, direction) in Batch::new(&map, kind, false, 150, 7).rays {
+            for (origin, direction) in Batch::new(&map, kind, false, false, 150, 7).rays {
                 let seen = map.surface.look(origin, direction, 0.0, judge::GRAZE, f64::INFINITY);
                 let plain = common::walk(&map.field, origin, direction, 1e4).unwrap_or(f64::INFINITY);
                 let same = seen.touch == plain || (seen.touch - plain).abs() < 1e-9 * (1.0 + plain);

@@ -45,16 +45,30 @@ pub const KINDS: [Kind; 10] = [
 ];
 
 impl Kind {
-    /// One ray; `single` rounds it to `f32`.
-    pub fn ray(self, surface: &Surface, random: &mut Random, single: bool) -> Ray {
-        let (mut origin, direction) = self.draw(surface, random);
+    /// `count` rays, added to `rays`: one of this kind, and its neighbours at steps of up to a texel, in the
+    /// same direction or fanning out. `single` rounds them to `f32`.
+    pub fn bundle(
+        self,
+        surface: &Surface,
+        random: &mut Random,
+        single: bool,
+        count: usize,
+        rays: &mut Vec<Ray>,
+    ) {
+        let (origin, direction) = self.draw(surface, random);
+        let step =
+            [random.range(-1.0, 1.0) / surface.width as f64, random.range(-0.3, 0.3) / surface.height as f64];
+        let fan = if random.next() < 0.5 { 0.0 } else { random.range(-0.02, 0.02) };
         let round = |x: f64| if single { f64::from(x as f32) } else { x };
-        origin[0] = round(origin[0]);
-        origin[1] = round(origin[1]);
-        if self == Kind::Shadow {
-            origin[2] = surface.point(origin[0], origin[1]);
+        for k in 0..count {
+            let k = k as f64;
+            let mut origin = [round(origin[0] + k * step[0]), round(origin[1] + k * step[1]), origin[2]];
+            let direction = [direction[0] * (1.0 + k * fan), direction[1] * (1.0 - k * fan), direction[2]];
+            if self == Kind::Shadow {
+                origin[2] = surface.point(origin[0], origin[1]);
+            }
+            rays.push((origin.map(round), direction.map(round)));
         }
-        (origin.map(round), direction.map(round))
     }
 
     fn draw(self, surface: &Surface, random: &mut Random) -> Ray {
