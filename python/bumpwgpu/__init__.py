@@ -21,6 +21,18 @@ from .marching import Hits, march
 from .mesh_maps import MeshMaps, MeshReport
 from .meshes import Mesh, MeshMaterial, Part
 from .rendering import Frame, HorizonShadows, render
+from .repair import (
+    CurlEvidence,
+    HeightEvidence,
+    IntegratedHeights,
+    NormalReport,
+    Seam,
+    TileReport,
+    check_normals,
+    dequantise,
+    heights_from_normals,
+    tile_report,
+)
 from .scene import Camera, Light, Material
 from .streaming import march_stream
 from .system import info
@@ -36,10 +48,13 @@ __all__ = [
     "Camera",
     "CompareError",
     "CompareResult",
+    "CurlEvidence",
     "Frame",
+    "HeightEvidence",
     "HeightMap",
     "Hits",
     "HorizonShadows",
+    "IntegratedHeights",
     "Light",
     "Maps",
     "Material",
@@ -48,18 +63,25 @@ __all__ = [
     "MeshMaps",
     "MeshMaterial",
     "MeshReport",
+    "NormalReport",
     "Part",
     "Recommendation",
     "RenderError",
     "Scene",
+    "Seam",
     "Tangents",
+    "TileReport",
     "__version__",
     "bake",
+    "check_normals",
     "compare",
+    "dequantise",
+    "heights_from_normals",
     "info",
     "march",
     "march_stream",
     "render",
     "tangents",
     "techniques",
+    "tile_report",
 ]

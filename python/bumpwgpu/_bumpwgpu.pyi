@@ -37,19 +37,25 @@ __all__ = [
     "bake_detail",
     "bake_map",
     "bake_tangents",
+    "check_normals",
     "compare_front",
     "compare_planar",
     "compare_recommend",
     "decode_image",
+    "dequantise",
+    "derivatives",
     "effective_bits",
+    "integrate_normals",
     "map_bytes",
     "map_registry",
     "march",
     "march_gpu",
     "mesh_map_registry",
+    "quantum",
     "read_image",
     "render",
     "save_map",
+    "seams",
     "simd_level",
     "tangent_methods",
     "tangents",
@@ -197,6 +203,7 @@ def bake_map(
     first: int,
     total: int,
 ) -> list[NDArray[np.float32]]: ...
+def check_normals(normals: NDArray[np.float32], wrap: str, heights: Field | None) -> dict[str, Any]: ...
 def compare_front(
     measured: Sequence[tuple[str, Sequence[float], float, float]], max_failure_rate: float
 ) -> list[tuple[int, list[int]]]: ...
@@ -216,7 +223,18 @@ def compare_recommend(
     max_failure_rate: float,
 ) -> tuple[int | None, str]: ...
 def decode_image(data: bytes) -> _Decoded: ...
+def dequantise(field: Field, quantum: float, progress: _Progress) -> NDArray[np.float32]: ...
+def derivatives() -> list[str]: ...
 def effective_bits(samples: NDArray[Any]) -> int: ...
+def integrate_normals(
+    normals: NDArray[np.float32],
+    convention: str,
+    wrap: str,
+    tile_size: tuple[float, float],
+    derivative: str,
+    steepest: float,
+    progress: _Progress,
+) -> tuple[NDArray[np.float32], dict[str, Any]]: ...
 def map_bytes(map: str, options: _Options, width: int, height: int, wrap: str) -> tuple[int, int]: ...
 def map_registry() -> list[dict[str, Any]]: ...
 def mesh_map_registry() -> list[dict[str, Any]]: ...
@@ -249,6 +267,7 @@ def march_gpu(
     parameters: _Parameters,
     outputs: Sequence[str],
 ) -> tuple[dict[str, NDArray[Any]], float]: ...
+def quantum(heights: NDArray[np.float32]) -> float | None: ...
 def read_image(path: _Path) -> _Decoded: ...
 def render(
     draws: Sequence[tuple[Mesh, int, int, Material]],
@@ -271,6 +290,7 @@ def save_map(
     format: str,
     bits: int,
 ) -> list[Path]: ...
+def seams(field: Field) -> list[dict[str, Any]]: ...
 def simd_level() -> str: ...
 def tangents(
     positions: NDArray[np.float32],

@@ -12,6 +12,7 @@ mod images;
 mod march;
 mod mesh;
 mod rendering;
+mod repair;
 mod run;
 mod system;
 
@@ -38,6 +39,8 @@ mod _bumpwgpu {
     use crate::mesh::{PyMesh, tangent_methods, tangents};
     #[pymodule_export]
     use crate::rendering::{PyMaterial, adapters, aov_names, march_gpu, render_scene};
+    #[pymodule_export]
+    use crate::repair::{check_normals, dequantise, derivatives, integrate_normals, quantum, seams};
     #[pymodule_export]
     use crate::system::{simd_level, threads};
 

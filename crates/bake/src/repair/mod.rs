@@ -1,12 +1,24 @@
 //! Repairs: what people ask for when a map arrives damaged or of unknown make.
 //!
-//! * [`mod@dequantise`]: 8-bit stair steps to smooth heights.
+//! * [`dequantise()`]: 8-bit stair steps to smooth heights.
+//! * [`integrate()`]: heights from a normal map.
+//! * [`check_normals`]: green channel, axes and lengths of normals, against heights if there are any.
+//! * [`seam`]: whether a map tiles.
 
+mod check;
 mod dequantise;
+mod evidence;
+mod fourier;
 mod grid;
+mod integrate;
 mod plate;
+mod seams;
 
+pub use check::{Axes, Check, Curl, Lengths, check_normals};
 pub use dequantise::{REACH, dequantise, quantum};
+pub use evidence::Against;
+pub use integrate::{Derivative, Integrated, Reading, integrate};
+pub use seams::{Seam, Verdict, seam};
 
 use crate::BakeError;
 use crate::memory::available_memory;
