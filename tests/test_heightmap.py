@@ -358,3 +358,26 @@ def test_real_maps(assets: Path) -> None:
     earth = assets / "paramap_earth" / "elevation_surface.jpg"
     with pytest.warns(bw.BumpWarning, match="JPEG"):
         assert bw.HeightMap(earth, invert=True).shape == (2048, 4096)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "error"), [("png", 0.5 / 65535), ("tiff", 0.0), ("TIF", 0.0), ("npy", 0.0)]
+)
+def test_saved_heights_come_back(suffix: str, error: float, tmp_path: Path) -> None:
+    heights = bw.HeightMap.procedural("noise", (13, 9))
+    path = heights.save(tmp_path / f"map.{suffix}")
+    assert [file.name for file in tmp_path.iterdir()] == [path.name]
+    back = bw.HeightMap(path)
+    assert np.abs(back.array - heights.array).max() <= error + 1e-7 * (error > 0)
+    assert back.bits == (16 if suffix == "png" else heights.bits)
+
+
+def test_heights_that_cannot_be_saved(tmp_path: Path) -> None:
+    heights = bw.HeightMap([[0.5]])
+    with pytest.raises(ValueError, match="png"):
+        heights.save(tmp_path / "map.jpg")
+    with pytest.raises(FileNotFoundError):
+        heights.save(tmp_path / "absent" / "map.png")
+    with pytest.raises(TypeError, match="path"):
+        heights.save(3)  # type: ignore[arg-type]
+    assert list(tmp_path.iterdir()) == []

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 import warnings
+from io import BytesIO
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _bumpwgpu
+from ._atomic import replace_file
 from ._checks import choice, flag, number, whole
 from ._images import Pixels, read_any
 from .errors import BumpWarning
@@ -223,6 +226,54 @@ class HeightMap:
         made._bits = self._bits
         made._field = _bumpwgpu.Field(made._array, made._wrap, made._extent)
         return made
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the heights, and nothing but them, to a file that :class:`HeightMap` reads back.
+
+        Parameters
+        ----------
+        path : path
+            The suffix decides: ``.png`` is 16-bit grey, ``.tif`` and ``.tiff`` are 32-bit float, ``.npy``
+            is float32. The folder must exist; the file appears only when it is complete.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        ValueError
+            Another suffix.
+        OSError
+            The file cannot be written.
+        TypeError
+            `path` is no path.
+
+        Examples
+        --------
+        >>> import bumpwgpu as bw, tempfile
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     bw.HeightMap(bw.HeightMap([[0.0, 0.25]]).save(folder + "/heights.png")).array.round(4)
+        array([[0.  , 0.25]], dtype=float32)
+        """
+        if not isinstance(path, str | os.PathLike):
+            raise TypeError(f"path must be a string or a path, got {type(path).__name__}")
+        target, data = Path(path), BytesIO()
+        kind = target.suffix.lower()
+        if kind == ".npy":
+            np.save(data, self._array, allow_pickle=False)
+        elif kind in (".png", ".tif", ".tiff"):
+            from PIL import Image
+
+            if kind == ".png":
+                steps = np.floor(self._array.astype(np.float64) * 65535.0 + 0.5).astype(np.uint16)
+                Image.fromarray(steps).save(data, format="PNG")
+            else:
+                Image.fromarray(self._array).save(data, format="TIFF")
+        else:
+            raise ValueError(f"cannot write heights to {target.name!r}; use .png, .tiff or .npy")
+        return replace_file(target, data.getvalue())
 
     @property
     def array(self) -> NDArray[np.float32]:

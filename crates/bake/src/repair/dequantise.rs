@@ -6,7 +6,8 @@
 //! without bending round real steps. So
 //! * rounding the result to the levels of the input gives **exactly the input**, also after storing
 //!   it in 16 bits;
-//! * terraces up to about [`REACH`] texels wide become slopes;
+//! * terraces become slopes: where they are 20 texels wide 0.05 quanta of error are left of 0.29, where
+//!   they are 100 wide 0.1;
 //! * steps of several quanta and flat ground between them stay; a lone step of one quantum cannot be
 //!   told from a gentle slope and becomes one.
 //!
@@ -24,8 +25,6 @@ use super::require;
 use crate::resample::{area_average, interpolate};
 use crate::{BakeError, Progress};
 
-/// How far a terrace may reach and still be sloped from end to end, in texels.
-pub const REACH: usize = 32 << (LEVELS - 1);
 /// Resolutions, each half of the one before.
 const LEVELS: usize = 6;
 /// Sides are not halved below this.

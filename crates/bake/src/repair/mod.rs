@@ -15,7 +15,7 @@ mod plate;
 mod seams;
 
 pub use check::{Axes, Check, Curl, Lengths, check_normals};
-pub use dequantise::{REACH, dequantise, quantum};
+pub use dequantise::{dequantise, quantum};
 pub use evidence::Against;
 pub use integrate::{Derivative, Integrated, Reading, integrate};
 pub use seams::{Seam, Verdict, seam};

@@ -25,6 +25,9 @@ use super::grid::{Grid, mixed, second, second_across};
 const SURE_NOISE: f32 = 1.5;
 /// Second differences from this on are taken as real, in quanta.
 const SURE_STEP: f32 = 4.0;
+/// How much of a smooth surface's own squared curvature counts as relief: what stairs it still has
+/// must not keep themselves up.
+const OWN_BENDS: f32 = 0.25;
 /// One over the variance of a rounding error.
 const PRECISION: f32 = 12.0;
 /// Largest eigenvalue of the sum of the plate's terms, 16 + 16 + 32, and of the tie.
@@ -137,7 +140,8 @@ impl Plate<'_> {
     fn with_bends_of(&self, relief: &[f32], surface: &[f32], axis: usize) -> Vec<f32> {
         let trusted = self.bends(self.quantised, axis);
         let mut squares = self.bends(surface, axis);
-        squares.par_iter_mut().zip(&trusted).for_each(|(d, data)| *d = *d * *d * trust(*data));
+        let share = |d: f32, data: f32| OWN_BENDS * d * d * trust(data);
+        squares.par_iter_mut().zip(&trusted).for_each(|(d, data)| *d = share(*d, *data));
         let mut found = self.grid.local_mean(&squares);
         found.par_iter_mut().zip(relief).for_each(|(v, relief)| *v = v.max(*relief));
         found
