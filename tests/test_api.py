@@ -47,6 +47,10 @@ SIGNATURES = {
     "Material": "height albedo normal * specular shininess normal_convention double_sided",
     "render": "mesh material * camera lights technique size shadows aovs device ambient background",
     "compare": "source techniques * elevations device rays repeats seed progress",
+    "dequantise": "source * bits progress **options",
+    "tile_report": "source **options",
+    "heights_from_normals": "normals * convention wrap tile_size base kernel steepest progress",
+    "check_normals": "normals heights * wrap",
     "info": "",
 }
 DEFAULTS = {
