@@ -207,7 +207,7 @@ def test_options_of_maps() -> None:
     ):
         bw.bake(hm, ("normal", "pyramid"), kernal="scharr")
     with pytest.raises(TypeError, match="pyramid takes no options"):
-        bw.bake(hm, "pyramid", depth=3)
+        bw.bake(hm, "pyramid", colour=3)
     with pytest.raises(TypeError, match="string"):
         bw.bake(hm, kernel=3)
 

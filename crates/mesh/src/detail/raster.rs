@@ -65,8 +65,9 @@ pub(super) struct Triangle {
     edges: [Edge; 3],
     low: DVec2,
     high: DVec2,
-    /// Twice the area, signed.
+    /// Twice the area, signed, and its inverse.
     area: f64,
+    inverse: f64,
 }
 
 impl Triangle {
@@ -75,7 +76,7 @@ impl Triangle {
         let area = (b - a).perp_dot(c - a);
         let sign = if area < 0.0 { -1.0 } else { 1.0 };
         let edges = [Edge::new(a, b, sign), Edge::new(b, c, sign), Edge::new(c, a, sign)];
-        Self { corners, edges, low: a.min(b).min(c), high: a.max(b).max(c), area }
+        Self { corners, edges, low: a.min(b).min(c), high: a.max(b).max(c), area, inverse: 1.0 / area }
     }
 
     /// Twice the area, square texels.
@@ -87,8 +88,8 @@ impl Triangle {
     #[inline(always)]
     pub(super) fn weights(&self, p: DVec2) -> [f32; 3] {
         let [a, b, c] = self.corners;
-        let second = (p - a).perp_dot(c - a) / self.area;
-        let third = (b - a).perp_dot(p - a) / self.area;
+        let second = (p - a).perp_dot(c - a) * self.inverse;
+        let third = (b - a).perp_dot(p - a) * self.inverse;
         [(1.0 - second - third) as f32, second as f32, third as f32]
     }
 

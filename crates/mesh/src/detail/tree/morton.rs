@@ -48,14 +48,19 @@ fn spread(x: u64) -> u64 {
 /// The triangles in the order of their centres along the curve, each with the first half of its code
 /// in the high word and its index in the low one.
 pub(super) fn order(triangles: usize, bounds_of: impl Fn(usize) -> Bounds + Sync) -> Vec<u64> {
-    let centre = |i: usize| {
-        let b = bounds_of(i);
-        std::array::from_fn(|k| 0.5 * b.low[k] + 0.5 * b.high[k])
-    };
-    let around = (0..triangles)
+    let centres: Vec<[f32; 3]> = (0..triangles)
         .into_par_iter()
         .with_min_len(1 << 14)
-        .fold(|| EMPTY, |b, i| b.with(centre(i)))
+        .map(|i| {
+            let b = bounds_of(i);
+            std::array::from_fn(|k| 0.5 * b.low[k] + 0.5 * b.high[k])
+        })
+        .collect();
+    let centre = |i: usize| centres[i];
+    let around = centres
+        .par_iter()
+        .with_min_len(1 << 14)
+        .fold(|| EMPTY, |b, &p| b.with(p))
         .reduce(|| EMPTY, Bounds::union);
     let cells = Cells::new(around);
     let mut keys: Vec<u64> = (0..triangles)
