@@ -38,6 +38,16 @@ pub enum HeightFieldError {
         /// Its value.
         value: f32,
     },
+    /// More cells than can be numbered.
+    #[error("{width} x {height} texels wrapped as {wrap:?} have too many corners: at most 2^31 - 1")]
+    Cells {
+        /// Texels across.
+        width: usize,
+        /// Texels down.
+        height: usize,
+        /// What lies beyond the edge; mirrored maps have four times the corners.
+        wrap: crate::Wrap,
+    },
     /// Scale, base or tile size make no sense.
     #[error("{name} is {value}; {expected}")]
     Extent {

@@ -132,6 +132,10 @@ impl HeightField {
             Wrap::Clamp => [width + 1, height + 1],
             Wrap::Mirror => [2 * width, 2 * height],
         };
+        // Corners are numbered by 32 bits.
+        if (cells[0] + 1).saturating_mul(cells[1] + 1) > i32::MAX as usize {
+            return Err(HeightFieldError::Cells { width, height, wrap });
+        }
         let first = Self::first_texel_of(wrap);
         let mut corners = Vec::with_capacity((cells[0] + 1) * (cells[1] + 1));
         for j in 0..=cells[1] as i64 {

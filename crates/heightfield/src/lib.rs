@@ -6,6 +6,7 @@
 //!
 //! Data flows one way: [`HeightField`] -> [`MaxPyramid`] -> [`search`] -> [`march()`].
 
+mod chunk;
 pub mod error;
 pub mod field;
 pub mod hits;
@@ -21,6 +22,7 @@ pub mod rays;
 pub mod search;
 pub mod skip_pyramid;
 pub mod technique;
+pub mod wide;
 
 pub use error::HeightFieldError;
 pub use field::{Extent, HeightField, Wrap};

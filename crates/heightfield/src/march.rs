@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
+use crate::chunk::Chunk;
 use crate::lanes;
 use crate::packet;
 use crate::rays::{fault_of, first_unsound, same_count};
@@ -37,64 +38,6 @@ impl Default for MarchOptions<'_> {
     }
 }
 
-/// A run of rays and the places their results go.
-pub struct Chunk<'a> {
-    pub(crate) origins: RayArray<'a>,
-    pub(crate) directions: RayArray<'a>,
-    pub(crate) from_surface: bool,
-    pub(crate) cancel: Option<&'a AtomicBool>,
-    pub(crate) t: Option<&'a mut [f32]>,
-    pub(crate) uv: Option<&'a mut [f32]>,
-    pub(crate) z: Option<&'a mut [f32]>,
-    pub(crate) normal: Option<&'a mut [f32]>,
-    pub(crate) steps: Option<&'a mut [u32]>,
-    pub(crate) status: Option<&'a mut [u8]>,
-}
-
-impl Chunk<'_> {
-    /// Whether the caller asked to stop. A ray may take milliseconds, so each asks anew.
-    #[inline(always)]
-    pub(crate) fn cancelled(&self) -> bool {
-        self.cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed))
-    }
-
-    #[inline(always)]
-    pub(crate) fn write(
-        &mut self,
-        i: usize,
-        status: Status,
-        t: f64,
-        steps: u32,
-        gradient: impl FnOnce() -> [f64; 2],
-    ) {
-        let hit = status == Status::Hit;
-        if let Some(out) = &mut self.t {
-            out[i] = if hit { t as f32 } else { f32::INFINITY };
-        }
-        if let Some(out) = &mut self.steps {
-            out[i] = steps;
-        }
-        if let Some(out) = &mut self.status {
-            out[i] = status as u8;
-        }
-        if self.uv.is_some() || self.z.is_some() {
-            let o = self.origins.get(i);
-            let d = self.directions.get(i);
-            let at = |axis: usize| if hit { (o[axis] + d[axis] * t) as f32 } else { f32::NAN };
-            if let Some(out) = &mut self.uv {
-                out[2 * i..2 * i + 2].copy_from_slice(&[at(0), at(1)]);
-            }
-            if let Some(out) = &mut self.z {
-                out[i] = at(2);
-            }
-        }
-        if let Some(out) = &mut self.normal {
-            let n = if hit { texture_space_normal(gradient()) } else { [f32::NAN; 3] };
-            out[3 * i..3 * i + 3].copy_from_slice(&n);
-        }
-    }
-}
-
 /// The unit normal `(-dh/du, -dh/dv, 1)` in texture space.
 #[inline(always)]
 pub fn texture_space_normal(gradient: [f64; 2]) -> [f32; 3] {
@@ -113,53 +56,35 @@ pub fn period(wrap: Wrap) -> f64 {
     }
 }
 
-/// Runs a search with the best instructions the processor has.
-///
-/// The code is the same and so are the results, bit for bit: wider instruction sets only bring cheap
-/// rounding and conversions. Everything below is inlined, so that it is compiled with them.
-pub(crate) fn dispatch<S: Search>(search: &S, field: &HeightField, chunk: &mut Chunk<'_>) {
-    #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
-        #[allow(unsafe_code)]
-        // SAFETY: the processor has the instructions, asked on the line above.
-        unsafe {
-            march_avx2(search, field, chunk);
-        }
-        return;
-    }
-    search.march(field, chunk);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn march_avx2<S: Search>(search: &S, field: &HeightField, chunk: &mut Chunk<'_>) {
-    search.march(field, chunk);
-}
-
-/// Runs a search on the `f32` segment of every ray.
+/// Runs a search that is written for one ray on every ray.
 #[inline(always)]
 pub(crate) fn march_by_segments<S: Search>(search: &S, field: &HeightField, chunk: &mut Chunk<'_>) {
-    let period = period(field.wrap());
     for i in 0..chunk.origins.len() {
         if chunk.cancelled() {
             return;
         }
-        let (origin, direction) = (chunk.origins.get(i), chunk.directions.get(i));
-        let cos_theta = field.extent().cos_theta(direction);
-        let Some(segment) = Segment::clip(origin, direction, cos_theta, period) else {
-            chunk.write(i, Status::Left, 0.0, 0, || [0.0; 2]);
-            continue;
-        };
-        let found = search.search(field, segment.start, segment.delta, cos_theta);
-        let status = match found.status {
-            Status::Left if !segment.closed => Status::Unconverged,
-            status => status,
-        };
-        let t = segment.t_start + f64::from(found.tau) * segment.t_length;
-        chunk.write(i, status, t, found.steps, || {
-            field.gradient_at(origin[0] + t * direction[0], origin[1] + t * direction[1])
-        });
+        march_one(search, field, chunk, i);
     }
+}
+
+/// Runs a search on the `f32` segment of one ray.
+#[inline(always)]
+pub(crate) fn march_one<S: Search>(search: &S, field: &HeightField, chunk: &mut Chunk<'_>, i: usize) {
+    let (origin, direction) = (chunk.origins.get(i), chunk.directions.get(i));
+    let cos_theta = field.extent().cos_theta(direction);
+    let Some(segment) = Segment::clip(origin, direction, cos_theta, period(field.wrap())) else {
+        chunk.write(i, Status::Left, 0.0, 0, || [0.0; 2]);
+        return;
+    };
+    let found = search.search(field, segment.start, segment.delta, cos_theta);
+    let status = match found.status {
+        Status::Left if !segment.closed => Status::Unconverged,
+        status => status,
+    };
+    let t = segment.t_start + f64::from(found.tau) * segment.t_length;
+    chunk.write(i, status, t, found.steps, || {
+        field.gradient_at(origin[0] + t * direction[0], origin[1] + t * direction[1])
+    });
 }
 
 /// Runs the exact search on every ray, many at once.
@@ -299,53 +224,5 @@ pub fn march_into(
     match fault.into_inner() {
         usize::MAX => Ok(()),
         index => Err(fault_of(origins, directions, index)),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::search::relief::Relief;
-
-    fn chunk<'a>(
-        origins: &'a [f64],
-        directions: &'a [f64],
-        t: &'a mut [f32],
-        steps: &'a mut [u32],
-    ) -> Chunk<'a> {
-        Chunk {
-            origins: RayArray::F64(origins),
-            directions: RayArray::F64(directions),
-            from_surface: false,
-            cancel: None,
-            t: Some(t),
-            uv: None,
-            z: None,
-            normal: None,
-            steps: Some(steps),
-            status: None,
-        }
-    }
-
-    /// Runs a search with the processor's best instructions and with the plain ones.
-    fn both_ways<S: Search>(search: &S) {
-        let texels: Vec<f32> = (0..64 * 48).map(|i| ((i * 7919) % 1009) as f32 / 1009.0).collect();
-        let field = HeightField::new(&texels, 64, 48, Wrap::Repeat).unwrap();
-        let n = 3000;
-        let spread = |i: usize, k: usize| ((i * k) % 997) as f64 / 997.0;
-        let origins: Vec<f64> = (0..n).flat_map(|i| [spread(i, 31), spread(i, 57), 1.0]).collect();
-        let directions: Vec<f64> =
-            (0..n).flat_map(|i| [spread(i, 13) - 0.5, 4.0 * spread(i, 7) - 2.0, -0.7]).collect();
-        let mut best = (vec![0.0; n], vec![0; n]);
-        let mut plain = (vec![0.0; n], vec![0; n]);
-        dispatch(search, &field, &mut chunk(&origins, &directions, &mut best.0, &mut best.1));
-        search.march(&field, &mut chunk(&origins, &directions, &mut plain.0, &mut plain.1));
-        assert!(best.0.iter().all(|t| t.is_finite()));
-        assert_eq!(best, plain);
-    }
-
-    #[test]
-    fn better_instructions_change_no_bit() {
-        both_ways(&Relief { linear: 32, refine: 8 });
     }
 }

@@ -4,6 +4,7 @@ use num_traits::Float;
 use rayon::prelude::*;
 
 use crate::HeightFieldError;
+use crate::lanes::Lanes;
 
 /// Rays looked at by one task at a time.
 const CHUNK: usize = 1 << 14;
@@ -59,6 +60,34 @@ impl<'a> RayArray<'a> {
         match self {
             Self::F32(a) => Self::F32(&a[3 * from..3 * to]),
             Self::F64(a) => Self::F64(&a[3 * from..3 * to]),
+        }
+    }
+}
+
+/// Rays `at` and on, one component a vector; the last ray stands in for those behind the end.
+#[inline(always)]
+pub(crate) fn load<L: Lanes>(rays: RayArray<'_>, at: usize) -> [L::D; 3] {
+    #[inline(always)]
+    fn split<T: Copy + Default>(rays: &[T], at: usize, width: usize) -> [[T; 16]; 3] {
+        let mut out = [[T::default(); 16]; 3];
+        let last = rays.len() / 3 - 1;
+        for i in 0..width {
+            let from = 3 * (at + i).min(last);
+            let ray = &rays[from..from + 3];
+            for (out, &x) in out.iter_mut().zip(ray) {
+                out[i] = x;
+            }
+        }
+        out
+    }
+    match rays {
+        RayArray::F32(rays) => {
+            let [u, v, z] = split(rays, at, L::WIDTH);
+            [L::widen(L::load(&u)), L::widen(L::load(&v)), L::widen(L::load(&z))]
+        }
+        RayArray::F64(rays) => {
+            let [u, v, z] = split(rays, at, L::WIDTH);
+            [L::load_wide(&u), L::load_wide(&v), L::load_wide(&z)]
         }
     }
 }

@@ -5,7 +5,7 @@
 
 use glam::Vec3;
 
-use crate::march::Chunk;
+use crate::chunk::Chunk;
 use crate::search::REGISTRY;
 use crate::{Found, HeightField, HeightFieldError};
 

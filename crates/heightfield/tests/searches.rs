@@ -131,18 +131,6 @@ fn one_step_techniques_follow_their_formulas() {
 }
 
 #[test]
-fn layers_follow_the_view_angle() {
-    use heightfield::search::layers::{exponential_layers, linear_layers};
-    assert_eq!(
-        (linear_layers(8, 64, 1.0), linear_layers(8, 64, 0.0), linear_layers(8, 64, 0.5)),
-        (8, 64, 36)
-    );
-    assert_eq!(exponential_layers(8, 32, 0.0), 32);
-    assert_eq!(exponential_layers(8, 32, 0.5), 16);
-    assert_eq!(exponential_layers(8, 32, 1.0), 8);
-}
-
-#[test]
 fn segments_end_on_floor_or_lid() {
     let clip = |o, d| Segment::clip(o, d, 1.0, 1.0);
     let s = clip([0.25, 0.5, 3.0], [0.5, 0.0, -2.0]).unwrap();

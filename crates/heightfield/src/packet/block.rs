@@ -2,6 +2,7 @@
 
 use super::grid::Axis;
 use crate::lanes::Lanes;
+use crate::rays::load;
 use crate::{HeightField, RayArray};
 
 /// Rays in a block: their state stays in the second-level cache.
@@ -48,34 +49,6 @@ impl Results {
     /// Nothing yet.
     pub fn new() -> Self {
         Self { drop: [0.0; ROOM], steps: [0; ROOM], begin: [0.0; ROOM], scale: [0.0; ROOM] }
-    }
-}
-
-/// Rays `at` and on, one component a vector; the last ray stands in for those behind the end.
-#[inline(always)]
-pub fn load<L: Lanes>(rays: RayArray<'_>, at: usize) -> [L::D; 3] {
-    #[inline(always)]
-    fn split<T: Copy + Default>(rays: &[T], at: usize, width: usize) -> [[T; 16]; 3] {
-        let mut out = [[T::default(); 16]; 3];
-        let last = rays.len() / 3 - 1;
-        for i in 0..width {
-            let from = 3 * (at + i).min(last);
-            let ray = &rays[from..from + 3];
-            for (out, &x) in out.iter_mut().zip(ray) {
-                out[i] = x;
-            }
-        }
-        out
-    }
-    match rays {
-        RayArray::F32(rays) => {
-            let [u, v, z] = split(rays, at, L::WIDTH);
-            [L::widen(L::load(&u)), L::widen(L::load(&v)), L::widen(L::load(&z))]
-        }
-        RayArray::F64(rays) => {
-            let [u, v, z] = split(rays, at, L::WIDTH);
-            [L::load_wide(&u), L::load_wide(&v), L::load_wide(&z)]
-        }
     }
 }
 

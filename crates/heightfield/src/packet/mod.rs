@@ -17,9 +17,9 @@ mod cells;
 mod coarse;
 mod grid;
 
+use crate::HeightField;
+use crate::chunk::{Chunk, Outcome};
 use crate::lanes::{Kernel, Lanes};
-use crate::march::Chunk;
-use crate::{HeightField, Status};
 use block::{BLOCK, Block, Results};
 use grid::Grid;
 
@@ -60,18 +60,24 @@ impl Kernel for Exact<'_, '_> {
             }
             let to = (from + BLOCK).min(n);
             descend::<L>(field, chunk, from..to, &mut block, &mut results);
-            for i in 0..to - from {
-                let drop = results.drop[i];
-                if drop.is_finite() {
-                    let t = (drop - results.begin[i]) * results.scale[i];
-                    let (o, d) = (chunk.origins.get(from + i), chunk.directions.get(from + i));
-                    chunk.write(from + i, Status::Hit, t, results.steps[i] as u32, || {
-                        field.gradient_at(o[0] + t * d[0], o[1] + t * d[1])
-                    });
-                }
-            }
-            chunk.march_singly(field, from..to, |i| !results.drop[i - from].is_finite());
+            write::<L>(field, chunk, from, to - from, &results);
+            chunk.march_singly(field, from..to, |i| results.drop[i - from].is_nan());
         }
+    }
+}
+
+/// Writes the hits of `n` rays from ray `from` on.
+#[inline(always)]
+fn write<L: Lanes>(field: &HeightField, chunk: &mut Chunk<'_>, from: usize, n: usize, results: &Results) {
+    for at in (0..n).step_by(L::WIDTH) {
+        let drop = L::load_wide(&results.drop[at..]);
+        let begin = L::load_wide(&results.begin[at..]);
+        let t = (drop - begin) * L::load_wide(&results.scale[at..]);
+        // False for NaN.
+        let hit = L::first(n - at) & L::le_wide(drop, drop);
+        let outcome = Outcome::<L> { hit, t, steps: L::load_int(&results.steps[at..]) };
+        let (origin, direction) = chunk.positions::<L>(from + at);
+        chunk.write_all(field, from + at, hit, &outcome, origin, direction);
     }
 }
 

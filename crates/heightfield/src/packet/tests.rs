@@ -1,8 +1,8 @@
 //! Every instruction set against the search for one ray, which the oracle is.
 
 use super::Exact;
+use crate::chunk::Chunk;
 use crate::lanes::{Level, dispatch_at};
-use crate::march::Chunk;
 use crate::{HeightField, RayArray, Status, Wrap, oracle};
 
 /// Whole numbers in no order, from 0 up to 997.

@@ -14,7 +14,8 @@ use glam::Vec3;
 use num_traits::{Float, FromPrimitive, NumCast};
 
 use super::Search;
-use crate::march::{Chunk, march_exact};
+use crate::chunk::Chunk;
+use crate::march::march_exact;
 use crate::{Found, HeightField, MaxPyramid, Status};
 
 technique! {

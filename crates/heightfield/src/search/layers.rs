@@ -1,54 +1,122 @@
 //! Walking a segment in equal layers; shared by every search that starts with linear steps.
 //! The twin of `shaders_wgsl/lib/layers.wgsl`.
 
-use glam::Vec3;
+use crate::lanes::Lanes;
+use crate::wide::{Heights, Segments};
 
-use crate::HeightField;
-
-/// The two samples between which the segment first goes below the surface.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bracket {
+/// The two samples between which each segment first goes below the surface.
+#[derive(Clone, Copy)]
+pub struct Brackets<L: Lanes> {
     /// Whether any sample lay below the surface.
-    pub found: bool,
+    pub found: L::M,
     /// Last position above the surface.
-    pub above: f32,
+    pub above: L::F,
     /// First position on or below it.
-    pub below: f32,
+    pub below: L::F,
     /// Ray height minus surface height at `above`, positive.
-    pub gap_above: f32,
+    pub gap_above: L::F,
     /// The same at `below`, not positive.
-    pub gap_below: f32,
+    pub gap_below: L::F,
     /// Height reads.
-    pub steps: u32,
+    pub steps: L::I,
 }
 
-/// Ray height minus surface height at `tau`.
-#[inline(always)]
-pub fn gap_at(field: &HeightField, start: Vec3, delta: Vec3, tau: f32) -> f32 {
-    let p = start + delta * tau;
-    p.z - field.sample(p.x, p.y)
+/// How many layers each segment is cut into.
+#[derive(Clone, Copy)]
+pub struct Layers<L: Lanes> {
+    count: L::F,
+    most: u32,
+    uniform: bool,
 }
 
-/// Samples the segment at the end of each of `layers` equal layers until one lies on or below the
-/// surface. The start is not sampled: on the lid nothing is above it. The end of a segment that goes
-/// down is the floor, which counts as below whatever the rounding.
-#[inline(always)]
-pub fn first_below(field: &HeightField, start: Vec3, delta: Vec3, layers: u32) -> Bracket {
-    let mut above = 0.0;
-    let mut gap_above = 0.0;
-    for i in 1..=layers {
-        let tau = i as f32 / layers as f32;
-        let gap = gap_at(field, start, delta, tau);
-        if gap <= 0.0 || (i == layers && delta.z < 0.0) {
-            if i == 1 {
-                gap_above = gap_at(field, start, delta, 0.0).max(0.0);
-            }
-            return Bracket { found: true, above, below: tau, gap_above, gap_below: gap.min(0.0), steps: i };
-        }
-        above = tau;
-        gap_above = gap;
+impl<L: Lanes> Layers<L> {
+    /// As many for all.
+    #[inline(always)]
+    pub fn uniform(count: u32) -> Self {
+        Self { count: L::splat(count as f32), most: count, uniform: true }
     }
-    Bracket { found: false, above, below: 1.0, gap_above, gap_below: gap_above, steps: layers }
+
+    /// Whole numbers, one a lane.
+    #[inline(always)]
+    fn varying(count: L::F) -> Self {
+        Self { count, most: L::largest(count) as u32, uniform: false }
+    }
+
+    /// For views at `cos_theta`: `most` at grazing angles, `least` head-on, changing linearly.
+    #[inline(always)]
+    pub fn linear(least: u32, most: u32, cos_theta: L::F) -> Self {
+        let (zero, one) = (L::splat(0.0), L::splat(1.0));
+        let (least, most) = (L::splat(least as f32), L::splat(most as f32));
+        let count = most + (least - most) * L::max(L::min(cos_theta, one), zero);
+        Self::varying(L::max(ceiling::<L>(count), one))
+    }
+
+    /// The same, changing by equal factors: `most * (least / most)^cos_theta`.
+    #[inline(always)]
+    pub fn exponential(least: u32, most: u32, cos_theta: L::F) -> Self {
+        let (least, most) = (least as f32, most as f32);
+        let mut factor = [0.0_f32; 16];
+        L::store(cos_theta, &mut factor);
+        for factor in &mut factor[..L::WIDTH] {
+            *factor = (least / most).powf(factor.clamp(0.0, 1.0));
+        }
+        let count = L::splat(most) * L::load(&factor);
+        Self::varying(L::max(ceiling::<L>(count), L::splat(1.0)))
+    }
+
+    /// The end of layer `i`, counted from 1, along the segment.
+    #[inline(always)]
+    fn end(&self, i: u32) -> L::F {
+        if self.uniform { L::splat(i as f32 / self.most as f32) } else { L::splat(i as f32) / self.count }
+    }
+}
+
+#[inline(always)]
+fn ceiling<L: Lanes>(x: L::F) -> L::F {
+    let zero = L::splat(0.0);
+    zero - L::floor(zero - x)
+}
+
+/// Samples each segment at the end of each of its layers until one lies on or below the surface. The
+/// start is not sampled: on the lid nothing is above it. The end of a segment that goes down is the
+/// floor, which counts as below whatever the rounding.
+#[inline(always)]
+pub fn first_below<L: Lanes>(heights: &Heights<'_, L>, rays: &Segments<L>, layers: Layers<L>) -> Brackets<L> {
+    let (zero, one) = (L::splat(0.0), L::splat(1.0));
+    let down = L::lt(rays.delta[2], zero);
+    let mut walking = L::first(L::WIDTH);
+    let mut bracket = Brackets {
+        found: L::first(0),
+        above: zero,
+        below: one,
+        gap_above: zero,
+        gap_below: zero,
+        steps: L::splat_int(0),
+    };
+    for i in 1..=layers.most {
+        let tau = layers.end(i);
+        let gap = rays.gap_at(heights, tau);
+        let last = L::le(layers.count, L::splat(i as f32));
+        let below = walking & (L::le(gap, zero) | (last & down));
+        bracket.steps = L::select_int(walking, L::splat_int(i as i32), bracket.steps);
+        bracket.found = bracket.found | below;
+        bracket.below = L::select(below, tau, bracket.below);
+        bracket.gap_below = L::select(below, L::min(gap, zero), bracket.gap_below);
+        walking = walking & !below;
+        bracket.above = L::select(walking, tau, bracket.above);
+        bracket.gap_above = L::select(walking, gap, bracket.gap_above);
+        walking = walking & !last;
+        if !L::any(walking) {
+            break;
+        }
+    }
+    // Who is below at the end of the first layer has nothing above but the start.
+    let first = bracket.found & L::le(bracket.above, zero);
+    if L::any(first) {
+        let gap = L::max(rays.gap_at(heights, zero), zero);
+        bracket.gap_above = L::select(first, gap, bracket.gap_above);
+    }
+    bracket
 }
 
 /// Whether any sample of a segment that leaves the surface lies strictly below it.
@@ -56,29 +124,42 @@ pub fn first_below(field: &HeightField, start: Vec3, delta: Vec3, layers: u32) -
 /// A start below the surface is lifted onto it: searches that stop at a layer return hits up to a layer
 /// too deep, and from there a surface would shadow itself.
 #[inline(always)]
-pub fn any_below(field: &HeightField, start: Vec3, delta: Vec3, layers: u32) -> bool {
-    let lift = Vec3::Z * (field.sample(start.x, start.y) - start.z).max(0.0);
-    let (start, delta) = (start + lift, delta - lift);
-    (1..=layers).any(|i| gap_at(field, start, delta, i as f32 / layers as f32) < 0.0)
+pub fn any_below<L: Lanes>(heights: &Heights<'_, L>, rays: &Segments<L>, layers: Layers<L>) -> L::M {
+    let zero = L::splat(0.0);
+    let mut rays = *rays;
+    let lift = L::max(heights.sample(rays.start[0], rays.start[1]) - rays.start[2], zero);
+    rays.start[2] = rays.start[2] + lift;
+    rays.delta[2] = rays.delta[2] - lift;
+    let mut blocked = L::first(0);
+    for i in 1..=layers.most {
+        let counts = L::le(L::splat(i as f32), layers.count);
+        blocked = blocked | (counts & L::lt(rays.gap_at(heights, layers.end(i)), zero));
+        if !L::any(!blocked & L::first(L::WIDTH)) {
+            break;
+        }
+    }
+    blocked
 }
 
 /// Where the chord between the two samples of a bracket reaches zero.
 #[inline(always)]
-pub fn secant(above: f32, below: f32, gap_above: f32, gap_below: f32) -> f32 {
+pub fn secant<L: Lanes>(above: L::F, below: L::F, gap_above: L::F, gap_below: L::F) -> L::F {
     let drop = gap_above - gap_below;
-    if drop > 0.0 { above + (below - above) * (gap_above / drop) } else { below }
+    let chord = above + (below - above) * (gap_above / drop);
+    L::select(L::lt(L::splat(0.0), drop), chord, below)
 }
 
-/// Layers for a view at `cos_theta`: `most` at grazing angles, `least` head-on, changing linearly.
-#[inline(always)]
-pub fn linear_layers(least: u32, most: u32, cos_theta: f32) -> u32 {
-    let (least, most) = (least as f32, most as f32);
-    (most + (least - most) * cos_theta.clamp(0.0, 1.0)).ceil().max(1.0) as u32
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lanes::Portable;
 
-/// The same, changing by equal factors: `most * (least / most)^cos_theta`.
-#[inline(always)]
-pub fn exponential_layers(least: u32, most: u32, cos_theta: f32) -> u32 {
-    let (least, most) = (least as f32, most as f32);
-    (most * (least / most).powf(cos_theta.clamp(0.0, 1.0))).ceil().max(1.0) as u32
+    #[test]
+    fn layers_follow_the_view_angle() {
+        type One = Portable<1>;
+        let linear = |cos_theta| Layers::<One>::linear(8, 64, One::splat(cos_theta)).most;
+        assert_eq!((linear(1.0), linear(0.0), linear(0.5)), (8, 64, 36));
+        let exponential = |cos_theta| Layers::<One>::exponential(8, 32, One::splat(cos_theta)).most;
+        assert_eq!((exponential(1.0), exponential(0.0), exponential(0.5)), (8, 32, 16));
+    }
 }

@@ -3,7 +3,8 @@
 
 use glam::Vec3;
 
-use crate::march::{Chunk, march_by_segments};
+use crate::chunk::Chunk;
+use crate::march::march_by_segments;
 use crate::technique::TechniqueInfo;
 use crate::{Found, HeightField};
 
@@ -52,12 +53,12 @@ macro_rules! technique {
             reads: $crate::technique::Reads::$reads,
             casts_shadows: $shadows,
             search: |field, start, delta, cos_theta, values| {
-                $type::read(values).search(field, start, delta, cos_theta)
+                $crate::search::Search::search(&$type::read(values), field, start, delta, cos_theta)
             },
             occluded: |field, start, delta, cos_theta, values| {
-                $type::read(values).occluded(field, start, delta, cos_theta)
+                $crate::search::Search::occluded(&$type::read(values), field, start, delta, cos_theta)
             },
-            march: |field, values, chunk| $crate::march::dispatch(&$type::read(values), field, chunk),
+            march: |field, values, chunk| $crate::search::Search::march(&$type::read(values), field, chunk),
         };
 
         impl $type {

@@ -4,42 +4,37 @@
 //! Fabio Policarpo, Manuel Oliveira and Joao Comba, Real-Time Relief Mapping on Arbitrary Polygonal
 //! Surfaces, I3D 2005. Bisecting half of the whole ray, as some published shaders do, loses the bracket.
 
-use glam::Vec3;
-
-use super::Search;
-use super::layers::{any_below, first_below, gap_at};
-use crate::{Found, HeightField};
+use super::layers::{Layers, any_below, first_below};
+use crate::lanes::Lanes;
+use crate::wide::{Findings, Heights, Segments, WideSearch};
 
 technique! {
-    /// Parameters of [`search`](Search::search) as described above.
+    /// Parameters of [`search`](WideSearch::search) as described above.
     Relief = "relief", reads Heights, casts_shadows true,
     summary "equal layers, then bisection inside the bracket",
     source "Policarpo, Oliveira and Comba 2005",
     parameters { linear: 32 in 1..=4096, "Equal layers between lid and floor."; refine: 8 in 0..=32, "Halvings of the bracket."; }
 }
 
-impl Search for Relief {
+impl WideSearch for Relief {
     #[inline(always)]
-    fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
-        let bracket = first_below(field, start, delta, self.linear);
-        if !bracket.found {
-            return Found::left(bracket.steps);
-        }
-        let mut above = bracket.above;
-        let mut below = bracket.below;
+    fn search<L: Lanes>(&self, heights: &Heights<'_, L>, rays: &Segments<L>) -> Findings<L> {
+        let bracket = first_below(heights, rays, Layers::uniform(self.linear));
+        let (mut above, mut below) = (bracket.above, bracket.below);
+        let half = L::splat(0.5);
         for _ in 0..self.refine {
-            let middle = 0.5 * (above + below);
-            if gap_at(field, start, delta, middle) <= 0.0 {
-                below = middle;
-            } else {
-                above = middle;
-            }
+            let middle = half * (above + below);
+            let under = L::le(rays.gap_at(heights, middle), L::splat(0.0));
+            below = L::select(under, middle, below);
+            above = L::select(under, above, middle);
         }
-        Found::hit(0.5 * (above + below), bracket.steps + self.refine)
+        let refined = L::splat_int(self.refine as i32);
+        let steps = L::select_int(bracket.found, bracket.steps + refined, bracket.steps);
+        Findings { tau: half * (above + below), hit: bracket.found, steps }
     }
 
     #[inline(always)]
-    fn occluded(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> bool {
-        any_below(field, start, delta, self.linear)
+    fn occluded<L: Lanes>(&self, heights: &Heights<'_, L>, rays: &Segments<L>) -> L::M {
+        any_below(heights, rays, Layers::uniform(self.linear))
     }
 }

@@ -4,30 +4,28 @@
 //! Morgan McGuire and Max McGuire, Steep Parallax Mapping, I3D 2005; Natalya Tatarchuk, Dynamic
 //! Parallax Occlusion Mapping with Approximate Soft Shadows, I3D 2006 (layers by angle).
 
-use glam::Vec3;
-
-use super::Search;
-use super::layers::{any_below, exponential_layers, first_below};
-use crate::{Found, HeightField};
+use super::layers::{Layers, any_below, first_below};
+use crate::lanes::Lanes;
+use crate::wide::{Findings, Heights, Segments, WideSearch};
 
 technique! {
-    /// Parameters of [`search`](Search::search) as described above.
+    /// Parameters of [`search`](WideSearch::search) as described above.
     SteepExponential = "steep_exponential", reads Heights, casts_shadows true,
     summary "layers adapted to the view angle (exponential)",
     source "McGuire and McGuire 2005; Tatarchuk 2006",
     parameters { min_steps: 8 in 1..=4096, "Layers for a view along the normal."; max_steps: 64 in 1..=4096, "Layers for a grazing view."; }
 }
 
-impl Search for SteepExponential {
+impl WideSearch for SteepExponential {
     #[inline(always)]
-    fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, cos_theta: f32) -> Found {
+    fn search<L: Lanes>(&self, heights: &Heights<'_, L>, rays: &Segments<L>) -> Findings<L> {
         let bracket =
-            first_below(field, start, delta, exponential_layers(self.min_steps, self.max_steps, cos_theta));
-        if bracket.found { Found::hit(bracket.below, bracket.steps) } else { Found::left(bracket.steps) }
+            first_below(heights, rays, Layers::exponential(self.min_steps, self.max_steps, rays.cos_theta));
+        Findings { tau: bracket.below, hit: bracket.found, steps: bracket.steps }
     }
 
     #[inline(always)]
-    fn occluded(&self, field: &HeightField, start: Vec3, delta: Vec3, cos_theta: f32) -> bool {
-        any_below(field, start, delta, exponential_layers(self.min_steps, self.max_steps, cos_theta))
+    fn occluded<L: Lanes>(&self, heights: &Heights<'_, L>, rays: &Segments<L>) -> L::M {
+        any_below(heights, rays, Layers::exponential(self.min_steps, self.max_steps, rays.cos_theta))
     }
 }

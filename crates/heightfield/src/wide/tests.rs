@@ -1,0 +1,82 @@
+//! Every instruction set against one lane.
+
+use super::march::March;
+use super::{Heights, WideSearch};
+use crate::chunk::Chunk;
+use crate::lanes::{Lanes, Level, Portable, dispatch_at};
+use crate::march::march_one;
+use crate::search::{
+    binary, interval, parallax, parallax_limited, pom, relief, steep_exponential, steep_linear,
+};
+use crate::{HeightField, Hits, OutputSet, RayArray, Wrap};
+
+fn fields() -> Vec<HeightField> {
+    let texels: Vec<f32> = (0..61 * 48).map(|i| ((i * 7919) % 1009) as f32 / 1009.0).collect();
+    [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror]
+        .into_iter()
+        .map(|wrap| HeightField::new(&texels, 61, 48, wrap).unwrap())
+        .collect()
+}
+
+fn same_bits<S: WideSearch>(search: &S) {
+    let n = 1501;
+    let spread = |i: usize, k: usize| ((i * k) % 997) as f64 / 997.0;
+    let origins: Vec<f64> = (0..n)
+        .flat_map(|i| [3.0 * spread(i, 31) - 1.0, spread(i, 57), 1.2 - spread(i, 11) * f64::from(i % 3 == 0)])
+        .collect();
+    let directions: Vec<f64> = (0..n)
+        .flat_map(|i| [spread(i, 13) - 0.5, 4.0 * spread(i, 7) - 2.0, [-0.7, 0.4, 0.0, -1.0][i % 4]])
+        .collect();
+    for field in fields() {
+        // Everything but the normal, whose cell is found anew from the position.
+        let run = |work: &mut dyn FnMut(&mut Chunk<'_>)| {
+            let mut hits = Hits::new(n, OutputSet::ALL);
+            let places = hits.as_mut();
+            work(&mut Chunk {
+                origins: RayArray::F64(&origins),
+                directions: RayArray::F64(&directions),
+                from_surface: false,
+                cancel: None,
+                t: places.t,
+                uv: places.uv,
+                z: places.z,
+                normal: places.normal,
+                steps: places.steps,
+                status: places.status,
+            });
+            let bits = |x: Option<Vec<f32>>| x.unwrap().into_iter().map(f32::to_bits).collect::<Vec<_>>();
+            (bits(hits.t), bits(hits.uv), bits(hits.z), bits(hits.normal), hits.steps, hits.status)
+        };
+        let alone = run(&mut |chunk| (0..n).for_each(|i| march_one(search, &field, chunk, i)));
+        for &level in Level::available() {
+            let together = run(&mut |chunk| dispatch_at(level, March { search, field: &field, chunk }));
+            assert!(alone == together, "{}", level.name());
+        }
+    }
+}
+
+#[test]
+fn every_level_gives_the_bits_of_one_lane() {
+    same_bits(&relief::Relief { linear: 32, refine: 8 });
+    same_bits(&interval::Interval { linear: 9, refine: 4 });
+    same_bits(&pom::Pom { steps: 17 });
+    same_bits(&binary::Binary { steps: 16 });
+    same_bits(&steep_linear::SteepLinear { min_steps: 8, max_steps: 64 });
+    same_bits(&steep_exponential::SteepExponential { min_steps: 8, max_steps: 64 });
+    same_bits(&parallax::Parallax {});
+    same_bits(&parallax_limited::ParallaxLimited {});
+}
+
+#[test]
+fn lanes_read_the_heights_of_the_field() {
+    type One = Portable<1>;
+    for field in fields() {
+        let heights = Heights::<One>::new(&field);
+        for i in 0..5000 {
+            let (u, v) = ((i % 71) as f32 * 0.07 - 2.1, (i % 97) as f32 * 0.037 - 1.3);
+            let mut got = [0.0];
+            One::store(heights.sample(One::splat(u), One::splat(v)), &mut got);
+            assert_eq!(got[0].to_bits(), field.sample(u, v).to_bits());
+        }
+    }
+}
