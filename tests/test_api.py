@@ -32,6 +32,7 @@ GPU = doctest.register_optionflag("GPU")
 SIGNATURES = {
     "HeightMap": "source * scale base tile_size wrap channel invert height_range",
     "HeightMap.procedural": "name size seed * scale base tile_size wrap",
+    "HeightMap.from_function": "function size * scale base tile_size wrap",
     "march": "height_map origins directions technique * device outputs from_surface out progress",
     "march_stream": "height_map chunks technique * outputs from_surface overlap",
     "bake": "source maps * progress **options",

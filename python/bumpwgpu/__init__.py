@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os as _os
 
-from . import techniques
+from . import surfaces, techniques
 from ._bumpwgpu import VERSION as __version__
 from .baking import Maps, bake
 from .compare import CompareResult, Recommendation, Scene, compare
@@ -81,6 +81,7 @@ __all__ = [
     "march",
     "march_stream",
     "render",
+    "surfaces",
     "tangents",
     "techniques",
     "tile_report",

@@ -37,6 +37,7 @@ __all__ = [
     "bake_detail",
     "bake_map",
     "bake_tangents",
+    "bend_normals",
     "check_normals",
     "compare_front",
     "compare_planar",
@@ -57,6 +58,7 @@ __all__ = [
     "save_map",
     "seams",
     "simd_level",
+    "surface_points",
     "tangent_methods",
     "tangents",
     "techniques",
@@ -292,6 +294,19 @@ def save_map(
 ) -> list[Path]: ...
 def seams(field: Field) -> list[dict[str, Any]]: ...
 def simd_level() -> str: ...
+def surface_points(
+    shape: str, radii: tuple[float, float], uv: NDArray[np.float64]
+) -> list[NDArray[np.float64]]: ...
+def bend_normals(
+    formula: str,
+    normals: NDArray[np.float64],
+    dpdu: NDArray[np.float64],
+    dpdv: NDArray[np.float64],
+    dndu: NDArray[np.float64],
+    dndv: NDArray[np.float64],
+    slopes: NDArray[np.float64],
+    rise: NDArray[np.float64],
+) -> NDArray[np.float64]: ...
 def tangents(
     positions: NDArray[np.float32],
     indices: NDArray[np.uint32],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
+from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, cast
@@ -171,6 +172,54 @@ class HeightMap:
         from .procedural import heights
 
         made = HeightMap(heights(name, size, seed), scale=scale, base=base, tile_size=tile_size, wrap=wrap)
+        made._bits = 32
+        return made
+
+    @staticmethod
+    def from_function(
+        function: Callable[[NDArray[np.float64], NDArray[np.float64]], ArrayLike],
+        size: int | tuple[int, int] = 512,
+        *,
+        scale: float = 0.1,
+        base: float = 1.0,
+        tile_size: float | tuple[float, float] = (1.0, 1.0),
+        wrap: Wrap = "repeat",
+    ) -> HeightMap:
+        """A height map sampled from any function.
+
+        Parameters
+        ----------
+        function : callable
+            ``function(u, v)`` with the texel centres, u of shape (1, W) and v of shape (H, 1) in 0..1, v
+            down, gives heights that broadcast to (H, W); 0..1, 1 = high.
+        size : int or (int, int), default 512
+            Texels: the side of a square, or (width, height).
+        scale, base, tile_size, wrap
+            As for :class:`HeightMap`.
+
+        Returns
+        -------
+        HeightMap
+
+        Raises
+        ------
+        ValueError
+            Heights that are not finite, of another shape, or outside 0..1; a size out of range.
+        TypeError
+            No function, or a size that is not a whole number.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import bumpwgpu as bw
+        >>> waves = bw.HeightMap.from_function(lambda u, v: 0.5 + 0.5 * np.sin(40 * u) * np.sin(40 * v), 64)
+        >>> waves.shape
+        (64, 64)
+        """
+        from .procedural import sampled
+
+        plane = sampled(function, size)
+        made = HeightMap(plane, scale=scale, base=base, tile_size=tile_size, wrap=wrap)
         made._bits = 32
         return made
 

@@ -10,12 +10,12 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from . import _bumpwgpu
 from ._checks import choice, whole, width_and_height
 
-__all__ = ["NAMES", "heights"]
+__all__ = ["NAMES", "heights", "sampled"]
 
 _Plane: TypeAlias = NDArray[np.float64]
 _Generator: TypeAlias = Callable[[_Plane, _Plane, np.random.Generator], _Plane]
@@ -197,6 +197,61 @@ def heights(name: str, size: int | tuple[int, int], seed: int) -> NDArray[np.flo
         For a name that is no string, or a size or seed that is no whole number.
     """
     choice("height map", name, NAMES)
+    u, v = _centres(size)
+    seed = whole("seed", seed)
+    if seed < 0:
+        raise ValueError(f"seed must not be negative, got {seed}")
+    plane = _GENERATORS[name](u, v, np.random.default_rng(seed))
+    return np.clip(plane, 0.0, 1.0).astype(np.float32)
+
+
+def sampled(
+    function: Callable[[_Plane, _Plane], ArrayLike], size: int | tuple[int, int]
+) -> NDArray[np.float32]:
+    """Heights of any function at the texel centres; see :meth:`bumpwgpu.HeightMap.from_function`.
+
+    Parameters
+    ----------
+    function : callable
+        Of u (1, W) and v (H, 1).
+    size : int or (int, int)
+        Texels: the side of a square, or (width, height).
+
+    Returns
+    -------
+    ndarray
+        float32, (H, W), 0..1.
+
+    Raises
+    ------
+    ValueError
+        Heights of another shape, not finite, or outside 0..1; a size out of range.
+    TypeError
+        No function, no numbers, or a size that is no whole number.
+    """
+    if not callable(function):
+        raise TypeError(f"function must be a function of u and v, got {type(function).__name__}")
+    u, v = _centres(size)
+    shape = (v.shape[0], u.shape[1])
+    values = np.asarray(function(u, v))
+    if values.dtype.kind not in "fiu":
+        raise TypeError(f"function must give numbers, got dtype {values.dtype}")
+    try:
+        plane = np.broadcast_to(values, shape)
+    except ValueError:
+        raise ValueError(
+            f"function must give heights that broadcast to {shape}, got {values.shape}"
+        ) from None
+    if not np.isfinite(plane).all():
+        raise ValueError("function gave NaN or infinity")
+    low, high = float(plane.min()), float(plane.max())
+    if low < 0.0 or high > 1.0:
+        raise ValueError(f"function must give heights in 0..1, got {low:g} to {high:g}")
+    return np.ascontiguousarray(plane, np.float32)
+
+
+def _centres(size: int | tuple[int, int]) -> tuple[_Plane, _Plane]:
+    """Texel centres of a map of that size, once it is in range."""
     width, height = width_and_height(size)
     limit = _bumpwgpu.MAX_SIDE
     if not (1 <= width <= limit and 1 <= height <= limit) or width * height > MAX_TEXELS:
@@ -204,10 +259,5 @@ def heights(name: str, size: int | tuple[int, int], seed: int) -> NDArray[np.flo
             f"size is {width} x {height}; each side must be 1 to {limit}, "
             f"and no more than {MAX_TEXELS} texels in all"
         )
-    seed = whole("seed", seed)
-    if seed < 0:
-        raise ValueError(f"seed must not be negative, got {seed}")
     u = (np.arange(width) + 0.5)[None] / width
-    v = (np.arange(height) + 0.5)[:, None] / height
-    plane = _GENERATORS[name](u, v, np.random.default_rng(seed))
-    return np.clip(plane, 0.0, 1.0).astype(np.float32)
+    return u, (np.arange(height) + 0.5)[:, None] / height

@@ -14,6 +14,7 @@ mod mesh;
 mod rendering;
 mod repair;
 mod run;
+mod surface;
 mod system;
 
 use pyo3::prelude::*;
@@ -41,6 +42,8 @@ mod _bumpwgpu {
     use crate::rendering::{PyMaterial, adapters, aov_names, march_gpu, render_scene};
     #[pymodule_export]
     use crate::repair::{check_normals, dequantise, derivatives, integrate_normals, quantum, seams};
+    #[pymodule_export]
+    use crate::surface::{bend_normals, surface_points};
     #[pymodule_export]
     use crate::system::{simd_level, threads};
 
