@@ -9,6 +9,7 @@
 //! map is saved.
 
 pub mod bits;
+pub mod cone;
 pub mod curvature;
 pub mod distance;
 pub mod encode;
@@ -24,6 +25,7 @@ pub mod moments;
 pub mod normal;
 pub mod occlusion;
 pub mod progress;
+pub mod provide;
 pub mod pyramid;
 pub mod relief;
 pub mod repair;
@@ -33,6 +35,7 @@ pub mod slopes;
 mod sweep;
 
 pub use bits::effective_bits;
+pub use cone::{ConeMode, cone_map, relaxed_cone_map};
 pub use curvature::curvature;
 pub use distance::distance_map;
 pub use error::BakeError;
@@ -49,6 +52,7 @@ pub use moments::{covariance, half_vector_density, moments, toksvig_roughness};
 pub use normal::{Convention, normal_map, normal_xy};
 pub use occlusion::{ao_map, bent_normal_map};
 pub use progress::Progress;
+pub use provide::{provide, provide_for};
 pub use pyramid::{Level, pyramid};
 pub use relief::relief_map;
 pub use slopes::slopes;

@@ -1,5 +1,6 @@
 //! What can go wrong in a comparison.
 
+use bake::BakeError;
 use heightfield::HeightFieldError;
 use thiserror::Error;
 
@@ -32,6 +33,9 @@ pub enum CompareError {
         /// Values given.
         got: usize,
     },
+    /// A map that a technique reads could not be baked.
+    #[error("{0}")]
+    Bake(String),
     /// The device could not march.
     #[error("device: {0}")]
     Device(String),
@@ -43,5 +47,15 @@ pub enum CompareError {
 impl CompareError {
     pub(crate) fn setting(name: &'static str, value: impl ToString, expected: impl Into<String>) -> Self {
         Self::Setting { name, value: value.to_string(), expected: expected.into() }
+    }
+}
+
+impl From<BakeError> for CompareError {
+    fn from(error: BakeError) -> Self {
+        match error {
+            BakeError::HeightField(error) => Self::HeightField(error),
+            BakeError::Interrupted => Self::Interrupted,
+            error => Self::Bake(error.to_string()),
+        }
     }
 }

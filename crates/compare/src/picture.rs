@@ -1,6 +1,7 @@
 //! Small pictures of a height map as a technique sees it, made on the CPU: a camera over the plane,
 //! looking up the image, so that one picture holds steep and grazing views.
 
+use bake::Progress;
 use glam::{DVec3, Vec3};
 use heightfield::{HeightField, MarchOptions, OutputSet, RayArray, Segment, Status, Technique, march};
 use rayon::prelude::*;
@@ -60,11 +61,12 @@ impl View {
         Ok(Self { size, centres, samples, reference })
     }
 
-    /// The picture that a technique makes.
+    /// The picture that a technique makes. Maps that it reads are baked when the field lacks them.
     ///
     /// # Errors
-    /// Whatever [`march`] refuses.
+    /// Whatever [`march`] refuses, or what keeps a map from being baked.
     pub fn picture(&self, field: &HeightField, technique: &Technique) -> Result<Picture, CompareError> {
+        bake::provide_for(field, technique.info.reads, Progress::none())?;
         let all = MarchOptions::default();
         let hits = cast(field, technique, &self.centres, &all)?;
         let errors = RayErrors::measure(field, &self.centres, &self.reference, &reported(&hits))?;

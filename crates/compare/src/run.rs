@@ -1,6 +1,7 @@
 //! A whole comparison of one height map: settings by elevations, errors and times.
 
-use heightfield::{HeightField, Hits, MarchOptions, RayArray, Segment, Technique, march};
+use bake::Progress;
+use heightfield::{BakedMap, HeightField, Hits, MarchOptions, RayArray, Segment, Technique, march};
 use rayon::prelude::*;
 
 use crate::metrics::percentile;
@@ -79,8 +80,14 @@ pub fn compare(
 ) -> Result<Vec<Row>, CompareError> {
     plan.check()?;
     let (settings, elevations) = (plan.techniques.len(), plan.elevations_deg.len());
-    let total = elevations * (1 + settings * (1 + plan.repeats));
+    let maps = missing_maps(field, &plan.techniques);
+    let total = maps.len() + elevations * (1 + settings * (1 + plan.repeats));
     let mut done = 0;
+    for map in maps {
+        let text = format!("baking map {:?}", map.name());
+        bake::provide(field, map, Progress::new(&mut |_, _| progress(done, total, &text)))?;
+        done += 1;
+    }
     let mut tell = |text: &str, step: usize| {
         let going = progress(done, total, text);
         done += step;
@@ -121,6 +128,17 @@ pub fn compare(
         rows.push(row(technique, None, &cells.iter().collect::<Vec<_>>(), plan.rays)?);
     }
     Ok(rows)
+}
+
+/// The baked maps that some technique reads and the field does not have, each once.
+fn missing_maps(field: &HeightField, techniques: &[Technique]) -> Vec<BakedMap> {
+    let mut maps = Vec::new();
+    for &map in techniques.iter().flat_map(|technique| technique.info.reads.baked()) {
+        if !field.has(map) && !maps.contains(&map) {
+            maps.push(map);
+        }
+    }
+    maps
 }
 
 impl Plan {

@@ -108,6 +108,40 @@ pub enum HeightFieldError {
         /// What is wrong.
         problem: String,
     },
+    /// A technique reads a baked map that the field does not have.
+    #[error("technique {technique:?} reads the map {map:?}, which was not baked for this height map")]
+    MapMissing {
+        /// Technique name.
+        technique: &'static str,
+        /// Map name.
+        map: &'static str,
+    },
+    /// A baked map does not fit the height map.
+    #[error("map {map:?} of {width} x {height} texels needs {expected} values, got {got}")]
+    BakedLength {
+        /// Map name.
+        map: &'static str,
+        /// Texels across.
+        width: usize,
+        /// Texels down.
+        height: usize,
+        /// Values needed.
+        expected: usize,
+        /// Values given.
+        got: usize,
+    },
+    /// A value of a baked map is NaN or out of range.
+    #[error("map {map:?}: value at row {row}, column {column} is {value}; it must be in 0..1")]
+    BakedValue {
+        /// Map name.
+        map: &'static str,
+        /// Row of the first offending texel.
+        row: usize,
+        /// Column of the first offending texel.
+        column: usize,
+        /// Its value.
+        value: f32,
+    },
     /// The caller asked to stop.
     #[error("interrupted")]
     Interrupted,

@@ -2,6 +2,8 @@
 
 use std::sync::OnceLock;
 
+use crate::baked::{BakedMap, BakedMaps};
+use crate::cone_map::{ConeKind, ConeMap};
 use crate::margin::Margins;
 use crate::{HeightFieldError, MaxPyramid, SkipPyramid};
 
@@ -104,6 +106,7 @@ pub struct HeightField {
     extent: Extent,
     pyramid: OnceLock<MaxPyramid>,
     skip_pyramid: OnceLock<SkipPyramid>,
+    baked: BakedMaps,
     margins: OnceLock<Margins>,
 }
 
@@ -151,6 +154,7 @@ impl HeightField {
             extent: Extent::default(),
             pyramid: OnceLock::new(),
             skip_pyramid: OnceLock::new(),
+            baked: BakedMaps::default(),
             margins: OnceLock::new(),
         })
     }
@@ -329,5 +333,21 @@ impl HeightField {
     /// The max pyramid with a margin around its nodes, built when first asked for.
     pub fn skip_pyramid(&self) -> &SkipPyramid {
         self.skip_pyramid.get_or_init(|| SkipPyramid::build(self))
+    }
+
+    /// Whether a baked map has been attached.
+    pub fn has(&self, map: BakedMap) -> bool {
+        self.baked.has(map)
+    }
+
+    /// The cone map of that kind, if one was attached.
+    #[inline(always)]
+    pub fn cone_map(&self, kind: ConeKind) -> Option<&ConeMap> {
+        self.baked.cone(kind)
+    }
+
+    /// Attaches a cone map of this field. A map of the same kind that is there already stays.
+    pub fn attach_cone_map(&self, map: ConeMap) {
+        self.baked.keep_cone(map);
     }
 }

@@ -6,7 +6,9 @@
 //!
 //! Data flows one way: [`HeightField`] -> [`MaxPyramid`] -> [`search`] -> [`march()`].
 
+pub mod baked;
 mod chunk;
+pub mod cone_map;
 pub mod error;
 pub mod field;
 pub mod hits;
@@ -24,6 +26,8 @@ pub mod skip_pyramid;
 pub mod technique;
 pub mod wide;
 
+pub use baked::BakedMap;
+pub use cone_map::{ConeKind, ConeMap};
 pub use error::HeightFieldError;
 pub use field::{Extent, HeightField, Wrap};
 pub use hits::{Hits, HitsMut, OutputSet};

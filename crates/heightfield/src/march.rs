@@ -26,7 +26,7 @@ pub struct MarchOptions<'a> {
     pub outputs: OutputSet,
     /// Whether rays start on the surface (shadow rays): the start then is no hit.
     ///
-    /// Only the exact search needs to know; the others never look at the start.
+    /// Only searches that look at the start need to know: the exact one and those that step by cones.
     pub from_surface: bool,
     /// Set to `true` from outside to stop early.
     pub cancel: Option<&'a AtomicBool>,
@@ -76,7 +76,11 @@ pub(crate) fn march_one<S: Search>(search: &S, field: &HeightField, chunk: &mut 
         chunk.write(i, Status::Left, 0.0, 0, || [0.0; 2]);
         return;
     };
-    let found = search.search(field, segment.start, segment.delta, cos_theta);
+    let found = if chunk.from_surface {
+        search.leave(field, segment.start, segment.delta, cos_theta)
+    } else {
+        search.search(field, segment.start, segment.delta, cos_theta)
+    };
     let status = match found.status {
         Status::Left if !segment.closed => Status::Unconverged,
         status => status,
@@ -152,6 +156,7 @@ pub(crate) fn exact_hit(
 /// # Errors
 /// [`HeightFieldError::RayCount`], [`HeightFieldError::RayNotFinite`] and
 /// [`HeightFieldError::RayZeroDirection`] name the first offending ray;
+/// [`HeightFieldError::MapMissing`] when the technique reads a map that was not attached;
 /// [`HeightFieldError::Interrupted`] after `cancel` was set.
 pub fn march(
     field: &HeightField,
@@ -182,6 +187,7 @@ pub fn march_into(
     mut places: HitsMut<'_>,
 ) -> Result<(), HeightFieldError> {
     same_count(origins, directions)?;
+    technique.check_maps(field)?;
     let n = origins.len();
     places.check(n)?;
     let chunks: Vec<Chunk<'_>> = (0..n)

@@ -31,12 +31,20 @@ pub struct Parameter {
 }
 
 /// What a technique reads; nothing else is baked, uploaded or bound for it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Reads {
     /// The height texture through a filtering sampler.
     Heights,
     /// The corner heights and the max pyramid.
     Pyramid,
+    /// The corner heights and the cone map.
+    Cone,
+    /// The corner heights and the cone map as published.
+    ConeTexel,
+    /// The corner heights, the cone map and the relaxed cone map.
+    RelaxedCone,
+    /// The corner heights and both maps as published.
+    RelaxedConeTexel,
 }
 
 /// Everything known about a technique that searches a height field.
@@ -128,6 +136,17 @@ impl Technique {
         }
         self.values[at] = value;
         Ok(self)
+    }
+
+    /// Checks that the field carries the maps that the technique reads.
+    ///
+    /// # Errors
+    /// [`HeightFieldError::MapMissing`] names the first that is missing.
+    pub fn check_maps(&self, field: &HeightField) -> Result<(), HeightFieldError> {
+        match self.info.reads.baked().iter().find(|&&map| !field.has(map)) {
+            None => Ok(()),
+            Some(map) => Err(HeightFieldError::MapMissing { technique: self.info.name, map: map.name() }),
+        }
     }
 
     /// Parameter names with their values.

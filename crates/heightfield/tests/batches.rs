@@ -6,7 +6,7 @@ mod common;
 
 use std::sync::atomic::AtomicBool;
 
-use common::{Random, noise};
+use common::Random;
 use heightfield::{
     HeightField, HeightFieldError, Hits, HitsMut, MarchOptions, OutputSet, RayArray, Technique, Wrap, march,
     march_into,
@@ -26,8 +26,14 @@ fn rays() -> (Vec<f32>, Vec<f32>) {
     (origins, directions)
 }
 
+fn noise(wrap: Wrap) -> HeightField {
+    let field = common::noise(61, 47, wrap, 3);
+    common::attach_baked(&field);
+    field
+}
+
 fn field() -> HeightField {
-    noise(61, 47, Wrap::Repeat, 3)
+    noise(Wrap::Repeat)
 }
 
 fn into(
@@ -149,7 +155,7 @@ fn no_ray_depends_on_its_neighbours() {
     let all = (origins[..3 * n].to_vec(), directions[..3 * n].to_vec());
     let everyone: Vec<usize> = (0..n).collect();
     for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
-        let field = noise(61, 47, wrap, 3);
+        let field = noise(wrap);
         for info in Technique::all() {
             let technique = Technique::named(info.name).unwrap();
             let together = bits(&field, &technique, &all, &everyone);
@@ -186,7 +192,7 @@ fn no_ray_depends_on_its_neighbours() {
 #[test]
 fn hostile_rays_end_and_give_numbers() {
     for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
-        let field = noise(61, 47, wrap, 3);
+        let field = noise(wrap);
         let rays: (Vec<_>, Vec<_>) = (0..88).map(hostile).unzip();
         let rays = (rays.0.concat(), rays.1.concat());
         for info in Technique::all() {

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{Random, from_fn, waves};
+use common::{Random, attach_baked, from_fn, waves};
 use heightfield::{
     HeightField, HeightFieldError, Hits, MarchOptions, RayArray, Segment, Status, Technique, Wrap, march,
     oracle,
@@ -49,6 +49,7 @@ fn every_technique_is_right_on_flat_ground() {
         for base in [0.0, 0.5, 1.0] {
             let extent = heightfield::Extent { base, ..Default::default() };
             let field = from_fn(8, 8, Wrap::Repeat, |_, _| level).with_extent(extent).unwrap();
+            attach_baked(&field);
             let (origins, directions) = rays(200, 0.7);
             for info in Technique::all() {
                 let technique = Technique::named(info.name).unwrap();

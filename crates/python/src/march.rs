@@ -2,7 +2,10 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use heightfield::{HeightFieldError, Hits, HitsMut, MarchOptions, OutputSet, RayArray, Technique};
+use heightfield::technique::Reads;
+use heightfield::{
+    HeightField, HeightFieldError, Hits, HitsMut, MarchOptions, OutputSet, RayArray, Technique,
+};
 use numpy::ndarray::Dimension;
 use numpy::{
     Element, PyArray, PyArray1, PyArrayMethods, PyReadonlyArray2, PyReadwriteArray, PyReadwriteArray1,
@@ -14,7 +17,7 @@ use pyo3::types::{PyDict, PyList};
 
 use crate::errors::Raise;
 use crate::field::Field;
-use crate::run::run;
+use crate::run::{Task, run};
 
 /// `(N, 3)` C-contiguous rays, float32 or float64, used where they lie.
 #[derive(FromPyObject)]
@@ -197,6 +200,11 @@ fn in_batch(error: HeightFieldError, first: usize) -> HeightFieldError {
     }
 }
 
+/// Bakes the maps that a search reads, unless the field has them; can be interrupted.
+pub fn provide(task: &Task, field: &HeightField, reads: Reads) -> Result<(), bake::BakeError> {
+    bake::provide_for(field, reads, bake::Progress::new(&mut |done, total| task.advance(done, total)))
+}
+
 /// Marches on the CPU, into the arrays of `out`: output names to arrays of N rows.
 ///
 /// `first` is the number of rays before these, for messages.
@@ -223,8 +231,9 @@ pub fn march<'py>(
     let flag = cancel.map(|cancel| &cancel.flag);
     run(py, None, |task| {
         let cancel = Some(flag.unwrap_or(task.cancel_flag()));
+        provide(task, &field, technique.info.reads)?;
         let options = MarchOptions { outputs: OutputSet::NONE, from_surface, cancel };
         heightfield::march_into(&field, &technique, origins, directions, &options, places)
-            .map_err(|error| in_batch(error, first))
+            .map_err(|error| bake::BakeError::from(in_batch(error, first)))
     })
 }

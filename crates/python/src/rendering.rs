@@ -13,7 +13,7 @@ use render::{AovSet, Camera, Draw, HorizonShadows, Light, Request, Scene, Techni
 
 use crate::errors::Raise;
 use crate::field::Field;
-use crate::march::{hits_to_dict, parse_outputs, parse_technique};
+use crate::march::{hits_to_dict, parse_outputs, parse_technique, provide};
 use crate::mesh::PyMesh;
 use crate::run::run;
 
@@ -112,8 +112,13 @@ pub fn render_scene<'py>(
         })
         .collect();
     let (eye, target, up, fov_y) = camera;
-    let frame = run(py, None, |_| {
+    let frame = run(py, None, |task| {
         let device = render::device()?;
+        if let TechniqueChoice::Search(technique) = &technique {
+            for (_, _, material) in &draws {
+                provide(task, &material.field, technique.info.reads)?;
+            }
+        }
         let draws = draws
             .iter()
             .map(|(mesh, triangles, material)| Draw {
@@ -211,8 +216,9 @@ pub fn march_gpu<'py>(
     let wanted = parse_outputs(&outputs)?;
     let field = field.shared();
     let (origins, directions) = (origins.as_slice()?, directions.as_slice()?);
-    let found = run(py, None, |_| {
+    let found = run(py, None, |task| {
         let device = render::device()?;
+        provide(task, &field, technique.info.reads)?;
         render::march(&device, &field, &technique, origins, directions)
     })?;
     // The device answers everything at once; what was not asked for is dropped here.

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
+use bake::Progress;
 use bytemuck::Zeroable;
-use heightfield::HeightField;
 use heightfield::technique::Reads;
+use heightfield::{BakedMap, ConeMap, HeightField};
 
 use crate::texture::{MipLevel, sampler, upload};
 use crate::uniforms::{HeightInfo, wrap_code};
@@ -41,12 +42,8 @@ impl Device {
         field: &Arc<HeightField>,
         reads: Reads,
     ) -> Result<wgpu::BindGroup, RenderError> {
-        let kind = match reads {
-            Reads::Heights => Kind::Heights,
-            Reads::Pyramid => Kind::Pyramid,
-        };
-        let (resource, _) =
-            self.keep(field, kind, || self.make_field_group(field, reads).map(Resource::Group))?;
+        let make = || self.make_field_group(field, reads).map(Resource::Group);
+        let (resource, _) = self.keep(field, Kind::Field(reads), make)?;
         match resource {
             Resource::Group(group) => Ok(group),
             Resource::View(_) => Err(RenderError::Device {
@@ -67,6 +64,19 @@ impl Device {
             bytemuck::bytes_of(&height_info(field, reads == Reads::Pyramid)),
             wgpu::BufferUsages::UNIFORM,
         )?;
+        let layout = match reads {
+            Reads::Heights => &self.layouts.heights,
+            Reads::Pyramid => &self.layouts.pyramid,
+            Reads::Cone | Reads::ConeTexel | Reads::RelaxedCone | Reads::RelaxedConeTexel => {
+                bake::provide_for(field, reads, Progress::none())?;
+                // Empty cones first, relaxed ones behind them.
+                let mut values = Vec::new();
+                for &BakedMap::Cone(kind) in reads.baked() {
+                    values.extend_from_slice(field.cone_map(kind).map_or(&[][..], ConeMap::values));
+                }
+                return self.cells_group(field, &info, &values);
+            }
+        };
         let level = MipLevel {
             size: [field.width(), field.height()],
             bytes: bytemuck::cast_slice(&field.texels()).to_vec(),
@@ -79,13 +89,11 @@ impl Device {
             bind(1, wgpu::BindingResource::Sampler(&sampler)),
             bind(2, info.as_entire_binding()),
         ];
-        let (layout, maxima) = match reads {
-            Reads::Heights => (&self.layouts.heights, None),
-            Reads::Pyramid => {
-                let maxima = bytemuck::cast_slice(field.skip_pyramid().maxima());
-                let buffer = self.buffer_with("skip pyramid", maxima, wgpu::BufferUsages::STORAGE)?;
-                (&self.layouts.pyramid, Some(buffer))
-            }
+        let maxima = if reads == Reads::Pyramid {
+            let maxima = bytemuck::cast_slice(field.skip_pyramid().maxima());
+            Some(self.buffer_with("skip pyramid", maxima, wgpu::BufferUsages::STORAGE)?)
+        } else {
+            None
         };
         entries.extend(maxima.iter().map(|buffer| bind(3, buffer.as_entire_binding())));
         self.guard("binding a height field", || {
@@ -93,6 +101,29 @@ impl Device {
                 label: Some("heights"),
                 layout,
                 entries: &entries,
+            }))
+        })
+    }
+
+    /// Group 1 of searches that walk from cell to cell: corners, what goes with the cells, and the info.
+    fn cells_group(
+        &self,
+        field: &HeightField,
+        info: &wgpu::Buffer,
+        values: &[f32],
+    ) -> Result<wgpu::BindGroup, RenderError> {
+        let storage = wgpu::BufferUsages::STORAGE;
+        let corners = self.buffer_with("corners", bytemuck::cast_slice(field.corners()), storage)?;
+        let values = self.buffer_with("cells", bytemuck::cast_slice(values), storage)?;
+        self.guard("binding a height field", || {
+            Ok(self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("cells"),
+                layout: &self.layouts.cells,
+                entries: &[
+                    bind(0, corners.as_entire_binding()),
+                    bind(1, values.as_entire_binding()),
+                    bind(2, info.as_entire_binding()),
+                ],
             }))
         })
     }

@@ -24,6 +24,8 @@ pub struct Layouts {
     pub heights: BindGroupLayout,
     /// Group 1: heights without filtering, and the skip pyramid.
     pub pyramid: BindGroupLayout,
+    /// Group 1: corners, and a buffer that goes with their cells: cone ratios.
+    pub cells: BindGroupLayout,
     /// Group 3.
     pub draw: BindGroupLayout,
     /// Group 0 of the march kernel.
@@ -79,6 +81,10 @@ impl Layouts {
                     entry(2, seen, uniform()),
                     entry(3, seen, storage(true)),
                 ],
+            ),
+            cells: make(
+                "cells",
+                &[entry(0, seen, storage(true)), entry(1, seen, storage(true)), entry(2, seen, uniform())],
             ),
             draw: make("draw", &[entry(0, ShaderStages::VERTEX_FRAGMENT, uniform())]),
             march: make(

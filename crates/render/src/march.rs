@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::heights::bind;
 use crate::layouts::MaterialMaps;
-use crate::pipeline::{Pipeline, PipelineKey, ReadsKey, constants_of};
+use crate::pipeline::{Pipeline, PipelineKey, constants_of};
 use crate::request::Program;
 use crate::targets::TargetSet;
 use crate::timer::Timer;
@@ -154,7 +154,7 @@ fn run(
             maps: MaterialMaps::None,
             horizon: false,
         },
-        reads: Some(ReadsKey::from(reads)),
+        reads: Some(reads),
         constants,
         targets: TargetSet::none(),
         double_sided: false,

@@ -14,27 +14,11 @@ use crate::{Device, RenderError, TechniqueChoice};
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(crate) struct PipelineKey {
     pub program: Program,
-    pub reads: Option<ReadsKey>,
+    pub reads: Option<Reads>,
     pub constants: Vec<(&'static str, i64)>,
     pub targets: TargetSet,
     pub double_sided: bool,
     pub mirrored: bool,
-}
-
-/// [`Reads`] with a hash.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) enum ReadsKey {
-    Heights,
-    Pyramid,
-}
-
-impl From<Reads> for ReadsKey {
-    fn from(reads: Reads) -> Self {
-        match reads {
-            Reads::Heights => Self::Heights,
-            Reads::Pyramid => Self::Pyramid,
-        }
-    }
 }
 
 /// A compiled pipeline.
@@ -86,16 +70,19 @@ pub(crate) fn constants_of(technique: &Technique, field: &HeightField) -> Vec<(&
 impl Device {
     fn constants(&self, key: &PipelineKey) -> Vec<(&'static str, f64)> {
         let mut constants: Vec<_> = key.constants.iter().map(|&(name, value)| (name, value as f64)).collect();
-        if key.reads == Some(ReadsKey::Heights) {
+        if key.reads == Some(Reads::Heights) {
             constants.push(("manual_bilinear", f64::from(u8::from(self.manual_bilinear))));
         }
         constants
     }
 
-    fn field_layout(&self, reads: Option<ReadsKey>) -> Option<&wgpu::BindGroupLayout> {
+    fn field_layout(&self, reads: Option<Reads>) -> Option<&wgpu::BindGroupLayout> {
         reads.map(|reads| match reads {
-            ReadsKey::Heights => &self.layouts.heights,
-            ReadsKey::Pyramid => &self.layouts.pyramid,
+            Reads::Heights => &self.layouts.heights,
+            Reads::Pyramid => &self.layouts.pyramid,
+            Reads::Cone | Reads::ConeTexel | Reads::RelaxedCone | Reads::RelaxedConeTexel => {
+                &self.layouts.cells
+            }
         })
     }
 

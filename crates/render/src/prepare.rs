@@ -10,7 +10,7 @@ use mesh::Mesh;
 use crate::geometry::{Geometry, ball, centre};
 use crate::heights::bind;
 use crate::layouts::MaterialMaps;
-use crate::pipeline::{Pipeline, PipelineKey, ReadsKey, attributes, constants_of, reads_of};
+use crate::pipeline::{Pipeline, PipelineKey, attributes, constants_of, reads_of};
 use crate::request::Program;
 use crate::targets::TargetSet;
 use crate::texture;
@@ -97,7 +97,7 @@ fn key(draw: &Draw<'_>, request: &Request, program: Program, shadows: bool) -> P
     }
     PipelineKey {
         program,
-        reads: reads_of(&request.technique).map(ReadsKey::from),
+        reads: reads_of(&request.technique),
         constants,
         targets: TargetSet::of(request.aovs),
         double_sided: draw.material.double_sided,

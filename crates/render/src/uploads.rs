@@ -7,16 +7,16 @@ use std::any::Any;
 use std::collections::HashMap;
 use std::sync::{Arc, Weak};
 
+use heightfield::technique::Reads;
+
 use crate::device::lock;
 use crate::{Device, RenderError};
 
 /// What an entry holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Kind {
-    /// Group 1 of searches that sample heights.
-    Heights,
-    /// Group 1 of searches that walk the pyramid.
-    Pyramid,
+    /// Group 1 of searches.
+    Field(Reads),
     /// Slope map.
     Slopes,
     /// 8-bit normal map baked from heights.

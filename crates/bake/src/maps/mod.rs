@@ -13,7 +13,8 @@ use heightfield::HeightField;
 
 use crate::encode::{Range, Rounding};
 use crate::{
-    BakeError, Progress, curvature, distance, horizon, mips, moments, normal, occlusion, pyramid, relief,
+    BakeError, Progress, cone, curvature, distance, horizon, mips, moments, normal, occlusion, pyramid,
+    relief,
 };
 
 pub use from_mesh::{FROM_MESH, HEIGHT, TANGENTS, about};
@@ -27,6 +28,8 @@ pub static REGISTRY: &[&Map] = &[
     &normal::NORMAL_XY,
     &relief::RELIEF,
     &pyramid::PYRAMID,
+    &cone::CONE,
+    &cone::RELAXED_CONE,
     &mips::NORMAL_MIPS,
     &moments::MOMENTS,
     &moments::TOKSVIG,

@@ -2,9 +2,10 @@
 
 use std::fmt;
 
+use bake::Progress;
 use compare::Rays;
 use compare::rays::{Random, lateral_per_height, planar};
-use heightfield::{Extent, HeightField, Wrap};
+use heightfield::{Extent, HeightField, Technique, Wrap};
 use rayon::prelude::*;
 
 /// Elevations of the view, degrees above the mean plane.
@@ -54,6 +55,12 @@ pub fn field(texels: &[f32], side: usize) -> HeightField {
     let extent = Extent { scale: SCALE, ..Extent::default() };
     let field = HeightField::new(texels, side, side, Wrap::Repeat).unwrap().with_extent(extent).unwrap();
     field.pyramid();
+    // Larger ones would take longer to bake than to bench.
+    if side <= 1024 {
+        for info in Technique::all() {
+            bake::provide_for(&field, info.reads, Progress::none()).unwrap();
+        }
+    }
     field
 }
 

@@ -45,7 +45,7 @@ pub struct CellRay<T> {
 }
 
 /// Farther from the surface than this, a start is not on it, whatever the caller says.
-const ON_SURFACE: f64 = 1e-3;
+pub(super) const ON_SURFACE: f64 = 1e-3;
 
 /// Where a ray met the surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -185,7 +185,7 @@ fn int<T: FromPrimitive + Float>(i: i64) -> T {
 /// `gap` is ray height minus surface height at the entry, `z_gap(s) = gap + s * (slope + s * bend)`.
 /// Returns the first `s` in `0..=length` where it reaches zero.
 #[inline(always)]
-fn first_root<T: Float>(gap: T, slope: T, bend: T, length: T, from_surface: bool) -> Option<T> {
+pub(super) fn first_root<T: Float>(gap: T, slope: T, bend: T, length: T, from_surface: bool) -> Option<T> {
     let zero = T::zero();
     if from_surface {
         // The start itself is a root: only the other one counts.

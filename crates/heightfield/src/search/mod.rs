@@ -15,6 +15,13 @@ pub trait Search: Sized {
     /// `cos_theta` is the cosine between ray and normal in mesh units.
     fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, cos_theta: f32) -> Found;
 
+    /// The same for a segment that starts on the surface: the start itself is no hit. Searches that do
+    /// not look at the start have nothing to add.
+    #[inline(always)]
+    fn leave(&self, field: &HeightField, start: Vec3, delta: Vec3, cos_theta: f32) -> Found {
+        self.search(field, start, delta, cos_theta)
+    }
+
     /// Whether a segment that starts on the surface and goes up is blocked.
     fn occluded(&self, field: &HeightField, start: Vec3, delta: Vec3, cos_theta: f32) -> bool;
 
@@ -72,16 +79,22 @@ macro_rules! technique {
 }
 
 pub mod binary;
+pub mod cone;
+pub mod cone_texel;
+pub mod cone_walk;
 pub mod exact;
 pub mod interval;
 pub mod layers;
 pub mod parallax;
 pub mod parallax_limited;
 pub mod pom;
+pub mod relaxed_cone;
+pub mod relaxed_cone_texel;
 pub mod relief;
 pub mod steep;
 pub mod steep_exponential;
 pub mod steep_linear;
+pub mod walk_axis;
 
 /// All techniques that search, in the order users see them.
 pub static REGISTRY: &[&TechniqueInfo] = &[
@@ -94,5 +107,9 @@ pub static REGISTRY: &[&TechniqueInfo] = &[
     &relief::INFO,
     &pom::INFO,
     &interval::INFO,
+    &cone_texel::INFO,
+    &relaxed_cone_texel::INFO,
+    &cone::INFO,
+    &relaxed_cone::INFO,
     &exact::INFO,
 ];

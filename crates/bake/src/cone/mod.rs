@@ -1,0 +1,184 @@
+//! Cone maps: how far a cone that stands on the surface may open.
+//!
+//! A ratio `c` is in UV units per height unit, 0..1: the cone over a point `x` of the surface holds the
+//! points above `h(x) + |y - x| / c`, lengths in UV units. Distances run across the edge of tiled and
+//! mirrored maps. Flat maps have ratio 1 everywhere.
+//!
+//! # What a ratio promises
+//!
+//! [`ConeMode::Conservative`]: the cone of a texel's ratio is empty ([`cone_map`]), or pierced at most once
+//! by any ray that falls or stays level as it leaves the axis ([`relaxed_cone_map`]), over *every* point of
+//! the bilinear surface that lies less than a texel away from the texel's centre along both axes. So any
+//! mean of the ratios of the four texels around a point, such as bilinear interpolation, is safe there, and
+//! so is the widest of the four.
+//!
+//! Why it holds: the ratio of a texel is the least of the four cells around it, and that of a cell is `1 / s`
+//! with `s` an upper bound of `(h(y) - h(x)) / |y - x|` over all `x` in the cell and all `y` of the surface -
+//! `near` has the bound and its proof for `y` next to the cell, `pair` for all others. For
+//! relaxed cones only those `y` count at which the surface falls along the way from `x`: a ray that left the axis above
+//! the surface and is below it can come out again only at such a point, and the cone holds none.
+//!
+//! [`ConeMode::Texel`]: the definitions as published. The plain cone of a texel's centre holds no other
+//! texel's centre (Dummer 2006); the relaxed one comes from rays through other texels, sampled at equal steps
+//! (Policarpo and Oliveira, GPU Gems 3, chapter 18, 2007). Neither holds between texels.
+//!
+//! Sources: Jonathan Dummer, Cone Step Mapping: An Iterative Ray-Heightfield Intersection Algorithm, 2006;
+//! Robert Ban, Gabor Valasek, Csaba Balint and Viktor Vad, Robust Cone Step Mapping, EGSR 2024.
+
+mod grid;
+mod near;
+mod pair;
+mod rules;
+mod search;
+
+use heightfield::HeightField;
+use rayon::prelude::*;
+
+use crate::encode::Range;
+use crate::maps::{self, Channel, Form, Kind, Layer, Map, MapInfo, MapOption, Options, Plan};
+use crate::{BakeError, Progress};
+use grid::{Grid, Sites};
+use rules::{Empty, EmptyTexel, Falling, FallingTexel};
+use search::{Rule, steepest_rises};
+
+/// What the ratios of a cone map promise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum ConeMode {
+    /// Safe on the bilinear surface, interpolated or not.
+    #[default]
+    Conservative,
+    /// As published, for comparison.
+    Texel,
+}
+
+/// Bytes a texel that a bake needs besides its result: slopes, tiles and the pyramid over them.
+const WORKING_BYTES: u128 = 12;
+
+const MODE: MapOption = MapOption {
+    name: "mode",
+    summary: "conservative: safe on the bilinear surface; texel: as published, for comparison",
+    kind: Kind::Choice { default: "conservative", choices: &["conservative", "texel"] },
+};
+
+impl ConeMode {
+    fn of(options: &Options) -> Self {
+        if options.choice(MODE.name) == "texel" { Self::Texel } else { Self::Conservative }
+    }
+}
+
+/// Ratios of empty cones.
+pub static CONE: Map = Map {
+    info: MapInfo {
+        name: "cone",
+        summary: "how far an empty cone over the surface opens, UV units per height unit, 0..1",
+        source: "Dummer 2006; Ban, Valasek, Balint and Vad 2024",
+        version: 1,
+        costly: true,
+        form: Form::Single,
+        channels: &[Channel::fixed("ratio", Range::LOWER_BOUND)],
+        options: &[MODE],
+    },
+    plan,
+    bake: |field, options, progress| {
+        let map = cone_map(field, ConeMode::of(options), progress)?;
+        Ok(vec![Layer::flat(field.width(), field.height(), map)])
+    },
+};
+
+/// Ratios of cones that a ray pierces at most once.
+pub static RELAXED_CONE: Map = Map {
+    info: MapInfo {
+        name: "relaxed_cone",
+        summary: "how far a cone that a ray pierces at most once opens, UV units per height unit, 0..1",
+        source: "Policarpo and Oliveira 2007; Ban, Valasek, Balint and Vad 2024",
+        version: 1,
+        costly: true,
+        form: Form::Single,
+        channels: &[Channel::fixed("ratio", Range::LOWER_BOUND)],
+        options: &[MODE],
+    },
+    plan,
+    bake: |field, options, progress| {
+        let map = relaxed_cone_map(field, ConeMode::of(options), progress)?;
+        Ok(vec![Layer::flat(field.width(), field.height(), map)])
+    },
+};
+
+fn plan(grid: maps::Grid, _options: &Options) -> Plan {
+    let cells: u128 = grid.cells().map(|n| n as u128 + 1).iter().product();
+    Plan::single(grid).working(cells * WORKING_BYTES)
+}
+
+/// Relative rounding of a slope, all steps together.
+const ROUNDING: f64 = 4e-7;
+
+/// Ratios of empty cones, one a texel, row by row.
+///
+/// # Errors
+/// [`BakeError::Interrupted`].
+pub fn cone_map(field: &HeightField, mode: ConeMode, progress: Progress<'_>) -> Result<Vec<f32>, BakeError> {
+    match mode {
+        ConeMode::Conservative => around_texels(field, &Empty, progress),
+        ConeMode::Texel => at_texels(field, &EmptyTexel, progress),
+    }
+}
+
+/// Ratios of cones that a ray pierces at most once, one a texel, row by row.
+///
+/// # Errors
+/// [`BakeError::Interrupted`].
+pub fn relaxed_cone_map(
+    field: &HeightField,
+    mode: ConeMode,
+    progress: Progress<'_>,
+) -> Result<Vec<f32>, BakeError> {
+    match mode {
+        ConeMode::Conservative => around_texels(field, &Falling, progress),
+        ConeMode::Texel => at_texels(field, &FallingTexel { field }, progress),
+    }
+}
+
+/// The ratio whose cone has this slope, rounded down. Slope 1 stands for all that are not steeper.
+fn ratio(slope: f32) -> f32 {
+    if slope <= 1.0 {
+        return 1.0;
+    }
+    let exact = (1.0 - ROUNDING) / f64::from(slope);
+    let near = exact as f32;
+    if f64::from(near) > exact { near.next_down() } else { near }
+}
+
+fn at_texels<R: Rule>(
+    field: &HeightField,
+    rule: &R,
+    mut progress: Progress<'_>,
+) -> Result<Vec<f32>, BakeError> {
+    let grid = Grid::new(field, Sites::Texels);
+    let first = -field.first_texel();
+    let size = [field.width(), field.height()];
+    let mut map = steepest_rises(&grid, rule, [first; 2], size, &mut progress)?;
+    map.par_iter_mut().for_each(|value| *value = ratio(*value));
+    Ok(map)
+}
+
+/// Each texel gets the least ratio of the four cells around it.
+fn around_texels<R: Rule>(
+    field: &HeightField,
+    rule: &R,
+    mut progress: Progress<'_>,
+) -> Result<Vec<f32>, BakeError> {
+    let grid = Grid::new(field, Sites::Cells);
+    let (width, height) = (field.width(), field.height());
+    // The cell before the first texel and all up to the one behind the last.
+    let first = -1 - field.first_texel();
+    let slopes = steepest_rises(&grid, rule, [first; 2], [width + 1, height + 1], &mut progress)?;
+    let mut map = vec![0.0_f32; width * height];
+    map.par_chunks_mut(width).enumerate().for_each(|(j, row)| {
+        let upper = &slopes[j * (width + 1)..][..width + 1];
+        let lower = &slopes[(j + 1) * (width + 1)..][..width + 1];
+        for (i, value) in row.iter_mut().enumerate() {
+            *value = ratio(upper[i].max(upper[i + 1]).max(lower[i].max(lower[i + 1])));
+        }
+    });
+    Ok(map)
+}

@@ -1,0 +1,51 @@
+//! Baking what searches read, and attaching it to the height field.
+
+use heightfield::technique::Reads;
+use heightfield::{BakedMap, ConeKind, ConeMap, HeightField};
+
+use crate::maps::{Map, Value, bake};
+use crate::{BakeError, Progress, cone};
+
+/// Bakes all maps that a search reads and attaches those that the field does not have yet.
+///
+/// # Errors
+/// As [`provide`].
+pub fn provide_for(field: &HeightField, reads: Reads, mut progress: Progress<'_>) -> Result<(), BakeError> {
+    let missing: Vec<BakedMap> = reads.baked().iter().copied().filter(|&map| !field.has(map)).collect();
+    let of = missing.len();
+    for (at, map) in missing.into_iter().enumerate() {
+        let mut part = |done: usize, total: usize| progress.report(at * total + done, of * total).is_ok();
+        provide(field, map, Progress::new(&mut part))?;
+    }
+    Ok(())
+}
+
+/// Bakes a map and attaches it to the field, unless the field has it already.
+///
+/// # Errors
+/// [`BakeError::Memory`] before anything is allocated, [`BakeError::Interrupted`].
+pub fn provide(field: &HeightField, map: BakedMap, progress: Progress<'_>) -> Result<(), BakeError> {
+    if field.has(map) {
+        return Ok(());
+    }
+    match map {
+        BakedMap::Cone(kind) => {
+            let (recipe, mode) = recipe(kind);
+            let options = recipe.info.defaults().with("mode", Value::Choice(mode.to_owned()))?;
+            let baked = bake(field, recipe, &options, progress)?;
+            for layer in baked.layers {
+                field.attach_cone_map(ConeMap::new(field, kind, &layer.texels)?);
+            }
+        }
+    }
+    Ok(())
+}
+
+fn recipe(kind: ConeKind) -> (&'static Map, &'static str) {
+    match kind {
+        ConeKind::Cone => (&cone::CONE, "conservative"),
+        ConeKind::ConeTexel => (&cone::CONE, "texel"),
+        ConeKind::RelaxedCone => (&cone::RELAXED_CONE, "conservative"),
+        ConeKind::RelaxedConeTexel => (&cone::RELAXED_CONE, "texel"),
+    }
+}

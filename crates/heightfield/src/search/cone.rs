@@ -1,0 +1,49 @@
+//! Cone stepping that misses nothing: each step goes as far as an empty cone reaches, or to the cell's
+//! wall after the bilinear cell was solved in closed form.
+//!
+//! Jonathan Dummer, Cone Step Mapping: An Iterative Ray-Heightfield Intersection Algorithm, 2006; Robert
+//! Ban, Gabor Valasek, Csaba Balint and Viktor Vad, Robust Cone Step Mapping, EGSR 2024 (a least step and
+//! cones that hold for the bilinear surface).
+
+use glam::Vec3;
+
+use super::Search;
+use super::cone_walk::{Cones, walk};
+use crate::{ConeKind, Found, HeightField, Status};
+
+technique! {
+    /// Parameters of [`search`](Search::search) as described above.
+    Cone = "cone", reads Cone, casts_shadows true,
+    summary "steps as far as an empty cone reaches, closed-form cells near the surface: misses nothing",
+    source "Dummer 2006; Ban, Valasek, Balint and Vad 2024",
+    parameters { steps: 16384 in 1..=65536, "Most steps; a ray that needs more is unconverged."; }
+}
+
+impl Cone {
+    #[inline(always)]
+    fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, from_surface: bool) -> Found {
+        let Some(map) = field.cone_map(ConeKind::Cone) else {
+            return Found { tau: 0.0, status: Status::Unconverged, steps: 0 };
+        };
+        let cones = Cones { empty: map.values(), relaxed: &[], refine: 0, most_steps: self.steps };
+        walk::<false, false>(field, &cones, start, delta, from_surface)
+    }
+}
+
+impl Search for Cone {
+    #[inline(always)]
+    fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
+        self.trace(field, start, delta, false)
+    }
+
+    #[inline(always)]
+    fn leave(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
+        self.trace(field, start, delta, true)
+    }
+
+    #[inline(always)]
+    fn occluded(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> bool {
+        let found = self.trace(field, start, delta, true);
+        found.status == Status::Hit && found.tau <= 1.0
+    }
+}

@@ -1,0 +1,47 @@
+//! The same walk as [`super::cone`] with the published cone map, interpolated between texels: what its
+//! cones cut off the surface is missed. It is here to show that.
+//!
+//! Jonathan Dummer, Cone Step Mapping: An Iterative Ray-Heightfield Intersection Algorithm, 2006.
+
+use glam::Vec3;
+
+use super::Search;
+use super::cone_walk::{Cones, walk};
+use crate::{ConeKind, Found, HeightField, Status};
+
+technique! {
+    /// Parameters of [`search`](Search::search) as described above.
+    ConeTexel = "cone_texel", reads ConeTexel, casts_shadows true,
+    summary "the same with the published cone map, whose cones cut the surface: to show what that misses",
+    source "Dummer 2006",
+    parameters { steps: 16384 in 1..=65536, "Most steps; a ray that needs more is unconverged."; }
+}
+
+impl ConeTexel {
+    #[inline(always)]
+    fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, from_surface: bool) -> Found {
+        let Some(map) = field.cone_map(ConeKind::ConeTexel) else {
+            return Found { tau: 0.0, status: Status::Unconverged, steps: 0 };
+        };
+        let cones = Cones { empty: map.values(), relaxed: &[], refine: 0, most_steps: self.steps };
+        walk::<true, false>(field, &cones, start, delta, from_surface)
+    }
+}
+
+impl Search for ConeTexel {
+    #[inline(always)]
+    fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
+        self.trace(field, start, delta, false)
+    }
+
+    #[inline(always)]
+    fn leave(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
+        self.trace(field, start, delta, true)
+    }
+
+    #[inline(always)]
+    fn occluded(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> bool {
+        let found = self.trace(field, start, delta, true);
+        found.status == Status::Hit && found.tau <= 1.0
+    }
+}

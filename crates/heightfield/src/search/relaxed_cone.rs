@@ -1,0 +1,57 @@
+//! Relaxed cone stepping that misses nothing: steps through cones that a ray pierces at most once; where
+//! one ends below the surface, the crossing lies in it and halving finds it. Rays that rise, such as those
+//! to a light, step by empty cones.
+//!
+//! Fabio Policarpo and Manuel Oliveira, Relaxed Cone Stepping for Relief Mapping, GPU Gems 3, chapter 18,
+//! 2007; Robert Ban, Gabor Valasek, Csaba Balint and Viktor Vad, Robust Cone Step Mapping, EGSR 2024 (cones
+//! that are pierced once).
+
+use glam::Vec3;
+
+use super::Search;
+use super::cone_walk::{Cones, walk};
+use crate::{ConeKind, Found, HeightField, Status};
+
+technique! {
+    /// Parameters of [`search`](Search::search) as described above.
+    RelaxedCone = "relaxed_cone", reads RelaxedCone, casts_shadows true,
+    summary "steps through cones that a ray pierces at most once, then halves: misses nothing",
+    source "Policarpo and Oliveira 2007; Ban, Valasek, Balint and Vad 2024",
+    parameters { steps: 16384 in 1..=65536, "Most steps; a ray that needs more is unconverged."; refine: 12 in 0..=32, "Halvings of a jump that ends below the surface, before it is followed cell by cell."; }
+}
+
+impl RelaxedCone {
+    #[inline(always)]
+    fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, from_surface: bool) -> Found {
+        let (Some(empty), Some(relaxed)) =
+            (field.cone_map(ConeKind::Cone), field.cone_map(ConeKind::RelaxedCone))
+        else {
+            return Found { tau: 0.0, status: Status::Unconverged, steps: 0 };
+        };
+        let cones = Cones {
+            empty: empty.values(),
+            relaxed: relaxed.values(),
+            refine: self.refine,
+            most_steps: self.steps,
+        };
+        walk::<false, true>(field, &cones, start, delta, from_surface)
+    }
+}
+
+impl Search for RelaxedCone {
+    #[inline(always)]
+    fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
+        self.trace(field, start, delta, false)
+    }
+
+    #[inline(always)]
+    fn leave(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
+        self.trace(field, start, delta, true)
+    }
+
+    #[inline(always)]
+    fn occluded(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> bool {
+        let found = self.trace(field, start, delta, true);
+        found.status == Status::Hit && found.tau <= 1.0
+    }
+}

@@ -1,0 +1,56 @@
+//! The same walk as [`super::relaxed_cone`] with the published maps, interpolated between texels: their
+//! cones are pierced more than once here and there, and what a step jumps over is missed. It is here to
+//! show that.
+//!
+//! Fabio Policarpo and Manuel Oliveira, Relaxed Cone Stepping for Relief Mapping, GPU Gems 3, chapter 18,
+//! 2007.
+
+use glam::Vec3;
+
+use super::Search;
+use super::cone_walk::{Cones, walk};
+use crate::{ConeKind, Found, HeightField, Status};
+
+technique! {
+    /// Parameters of [`search`](Search::search) as described above.
+    RelaxedConeTexel = "relaxed_cone_texel", reads RelaxedConeTexel, casts_shadows true,
+    summary "the same with the published maps, pierced more than once: to show what that misses",
+    source "Policarpo and Oliveira 2007",
+    parameters { steps: 16384 in 1..=65536, "Most steps; a ray that needs more is unconverged."; refine: 12 in 0..=32, "Halvings of a jump that ends below the surface, before it is followed cell by cell."; }
+}
+
+impl RelaxedConeTexel {
+    #[inline(always)]
+    fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, from_surface: bool) -> Found {
+        let (Some(empty), Some(relaxed)) =
+            (field.cone_map(ConeKind::ConeTexel), field.cone_map(ConeKind::RelaxedConeTexel))
+        else {
+            return Found { tau: 0.0, status: Status::Unconverged, steps: 0 };
+        };
+        let cones = Cones {
+            empty: empty.values(),
+            relaxed: relaxed.values(),
+            refine: self.refine,
+            most_steps: self.steps,
+        };
+        walk::<true, true>(field, &cones, start, delta, from_surface)
+    }
+}
+
+impl Search for RelaxedConeTexel {
+    #[inline(always)]
+    fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
+        self.trace(field, start, delta, false)
+    }
+
+    #[inline(always)]
+    fn leave(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
+        self.trace(field, start, delta, true)
+    }
+
+    #[inline(always)]
+    fn occluded(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> bool {
+        let found = self.trace(field, start, delta, true);
+        found.status == Status::Hit && found.tau <= 1.0
+    }
+}
