@@ -41,3 +41,14 @@ fn cell_root(ray: CellRay, length: f32) -> f32 {
     let touches = discriminant + 4.0 * ray.bend * ray.rounding >= 0.0 && denominator > 0.0 && s <= length;
     return select(-1.0, s, touches);
 }
+
+// First s in 0..length where a ray that starts on the patch meets it again, or goes below it at once; or -1.
+fn root_from_surface(ray: CellRay, length: f32) -> f32 {
+    if ray.slope < 0.0 || (ray.slope == 0.0 && ray.bend < 0.0) {
+        return 0.0;
+    }
+    if ray.bend < 0.0 && ray.slope <= -ray.bend * length {
+        return -ray.slope / ray.bend;
+    }
+    return -1.0;
+}

@@ -34,17 +34,6 @@ fn ray_in_cell(x: WalkAxis, y: WalkAxis, z: f32, t: f32, direction: vec3f) -> Ce
     return cell_ray(cell_heights(cell_index(x, y)), local, z, t, direction);
 }
 
-// First s in 0..length where a ray that starts on the patch meets it again, or goes below it at once; or -1.
-fn root_from_surface(ray: CellRay, length: f32) -> f32 {
-    if ray.slope < 0.0 || (ray.slope == 0.0 && ray.bend < 0.0) {
-        return 0.0;
-    }
-    if ray.bend < 0.0 && ray.slope <= -ray.bend * length {
-        return -ray.slope / ray.bend;
-    }
-    return -1.0;
-}
-
 // With `relaxed` the buffer holds the relaxed cones behind the empty ones.
 fn walk(start: vec3f, delta: vec3f, from_surface: bool, most_steps: i32, relaxed: bool, halvings: i32) -> Found {
     let periodic = height_info.wrap != 1u;

@@ -1,10 +1,10 @@
 //! Baking what searches read, and attaching it to the height field.
 
 use heightfield::technique::Reads;
-use heightfield::{BakedMap, ConeKind, ConeMap, HeightField};
+use heightfield::{BakedMap, ConeKind, ConeMap, DistanceMap, HeightField};
 
 use crate::maps::{Map, Value, bake};
-use crate::{BakeError, Progress, cone};
+use crate::{BakeError, Progress, cone, distance};
 
 /// Bakes all maps that a search reads and attaches those that the field does not have yet.
 ///
@@ -35,6 +35,13 @@ pub fn provide(field: &HeightField, map: BakedMap, progress: Progress<'_>) -> Re
             let baked = bake(field, recipe, &options, progress)?;
             for layer in baked.layers {
                 field.attach_cone_map(ConeMap::new(field, kind, &layer.texels)?);
+            }
+        }
+        BakedMap::Distance => {
+            let recipe = &distance::DISTANCE;
+            let baked = bake(field, recipe, &recipe.info.defaults(), progress)?;
+            for layer in baked.layers {
+                field.attach_distance_map(DistanceMap::new(field, layer.depth, &layer.texels)?);
             }
         }
     }

@@ -5,6 +5,7 @@
 use std::sync::OnceLock;
 
 use crate::cone_map::{ConeKind, ConeMap};
+use crate::distance_map::DistanceMap;
 use crate::technique::Reads;
 
 /// A map that is baked before some search can run.
@@ -12,6 +13,8 @@ use crate::technique::Reads;
 pub enum BakedMap {
     /// A [`ConeMap`].
     Cone(ConeKind),
+    /// A [`DistanceMap`].
+    Distance,
 }
 
 impl BakedMap {
@@ -19,6 +22,7 @@ impl BakedMap {
     pub fn name(self) -> &'static str {
         match self {
             BakedMap::Cone(kind) => kind.name(),
+            BakedMap::Distance => "distance",
         }
     }
 }
@@ -26,12 +30,13 @@ impl BakedMap {
 impl Reads {
     /// The maps that must be attached to the field.
     pub fn baked(self) -> &'static [BakedMap] {
-        use BakedMap::Cone;
+        use BakedMap::{Cone, Distance};
         match self {
             Reads::Heights | Reads::Pyramid => &[],
             Reads::Cone => &[Cone(ConeKind::Cone)],
             Reads::ConeTexel => &[Cone(ConeKind::ConeTexel)],
             Reads::RelaxedCone => &[Cone(ConeKind::Cone), Cone(ConeKind::RelaxedCone)],
+            Reads::Distance => &[Distance],
             Reads::RelaxedConeTexel => &[Cone(ConeKind::ConeTexel), Cone(ConeKind::RelaxedConeTexel)],
         }
     }
@@ -41,6 +46,7 @@ impl Reads {
 #[derive(Debug, Default)]
 pub(crate) struct BakedMaps {
     cones: [OnceLock<ConeMap>; ConeKind::ALL.len()],
+    distance: OnceLock<DistanceMap>,
 }
 
 impl BakedMaps {
@@ -53,9 +59,19 @@ impl BakedMaps {
         let _ = self.cones[map.kind() as usize].set(map);
     }
 
+    pub(crate) fn distance(&self) -> Option<&DistanceMap> {
+        self.distance.get()
+    }
+
+    /// Keeps the map; the first one stays.
+    pub(crate) fn keep_distance(&self, map: DistanceMap) {
+        let _ = self.distance.set(map);
+    }
+
     pub(crate) fn has(&self, map: BakedMap) -> bool {
         match map {
             BakedMap::Cone(kind) => self.cone(kind).is_some(),
+            BakedMap::Distance => self.distance().is_some(),
         }
     }
 }

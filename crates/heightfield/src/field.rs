@@ -4,6 +4,7 @@ use std::sync::OnceLock;
 
 use crate::baked::{BakedMap, BakedMaps};
 use crate::cone_map::{ConeKind, ConeMap};
+use crate::distance_map::DistanceMap;
 use crate::margin::Margins;
 use crate::{HeightFieldError, MaxPyramid, SkipPyramid};
 
@@ -349,5 +350,16 @@ impl HeightField {
     /// Attaches a cone map of this field. A map of the same kind that is there already stays.
     pub fn attach_cone_map(&self, map: ConeMap) {
         self.baked.keep_cone(map);
+    }
+
+    /// The distance map, if it has been attached.
+    #[inline(always)]
+    pub fn distance_map(&self) -> Option<&DistanceMap> {
+        self.baked.distance()
+    }
+
+    /// Attaches a distance map; one that is there already stays.
+    pub fn attach_distance_map(&self, map: DistanceMap) {
+        self.baked.keep_distance(map);
     }
 }

@@ -9,6 +9,7 @@
 pub mod baked;
 mod chunk;
 pub mod cone_map;
+pub mod distance_map;
 pub mod error;
 pub mod field;
 pub mod hits;
@@ -28,6 +29,7 @@ pub mod wide;
 
 pub use baked::BakedMap;
 pub use cone_map::{ConeKind, ConeMap};
+pub use distance_map::DistanceMap;
 pub use error::HeightFieldError;
 pub use field::{Extent, HeightField, Wrap};
 pub use hits::{Hits, HitsMut, OutputSet};

@@ -45,6 +45,8 @@ pub enum Reads {
     RelaxedCone,
     /// The corner heights and both maps as published.
     RelaxedConeTexel,
+    /// The corner heights and the distance map.
+    Distance,
 }
 
 /// Everything known about a technique that searches a height field.

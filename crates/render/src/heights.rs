@@ -8,7 +8,7 @@ use heightfield::technique::Reads;
 use heightfield::{BakedMap, ConeMap, HeightField};
 
 use crate::texture::{MipLevel, sampler, upload};
-use crate::uniforms::{HeightInfo, wrap_code};
+use crate::uniforms::{DistanceInfo, HeightInfo, wrap_code};
 use crate::uploads::{Kind, Resource};
 use crate::{Device, RenderError};
 
@@ -71,10 +71,16 @@ impl Device {
                 bake::provide_for(field, reads, Progress::none())?;
                 // Empty cones first, relaxed ones behind them.
                 let mut values = Vec::new();
-                for &BakedMap::Cone(kind) in reads.baked() {
-                    values.extend_from_slice(field.cone_map(kind).map_or(&[][..], ConeMap::values));
+                for &map in reads.baked() {
+                    if let BakedMap::Cone(kind) = map {
+                        values.extend_from_slice(field.cone_map(kind).map_or(&[][..], ConeMap::values));
+                    }
                 }
-                return self.cells_group(field, &info, &values);
+                return self.cells_group(field, &info, bytemuck::cast_slice(&values));
+            }
+            Reads::Distance => {
+                bake::provide_for(field, reads, Progress::none())?;
+                return self.cells_group(field, &info, &distances(field));
             }
         };
         let level = MipLevel {
@@ -110,11 +116,11 @@ impl Device {
         &self,
         field: &HeightField,
         info: &wgpu::Buffer,
-        values: &[f32],
+        values: &[u8],
     ) -> Result<wgpu::BindGroup, RenderError> {
         let storage = wgpu::BufferUsages::STORAGE;
         let corners = self.buffer_with("corners", bytemuck::cast_slice(field.corners()), storage)?;
-        let values = self.buffer_with("cells", bytemuck::cast_slice(values), storage)?;
+        let values = self.buffer_with("cells", values, storage)?;
         self.guard("binding a height field", || {
             Ok(self.device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: Some("cells"),
@@ -166,6 +172,22 @@ impl Device {
         })?;
         Ok(buffer)
     }
+}
+
+/// The distance map of a field that has one, as `shaders_wgsl/bindings/distance.wgsl` wants it.
+fn distances(field: &HeightField) -> Vec<u8> {
+    let Some(map) = field.distance_map() else { return Vec::new() };
+    let info = DistanceInfo {
+        metric: map.metric().to_array(),
+        unit: map.unit(),
+        size: map.size().map(|side| side as u32),
+        pad_0: 0,
+    };
+    let mut bytes = bytemuck::bytes_of(&info).to_vec();
+    bytes.extend_from_slice(bytemuck::cast_slice(map.codes()));
+    // Two codes make a word.
+    bytes.resize(bytes.len().next_multiple_of(4), 0);
+    bytes
 }
 
 /// A bind group entry.

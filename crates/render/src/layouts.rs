@@ -24,7 +24,7 @@ pub struct Layouts {
     pub heights: BindGroupLayout,
     /// Group 1: heights without filtering, and the skip pyramid.
     pub pyramid: BindGroupLayout,
-    /// Group 1: corners, and a buffer that goes with their cells: cone ratios.
+    /// Group 1: corners, and a buffer that goes with their cells: cone ratios or distances.
     pub cells: BindGroupLayout,
     /// Group 3.
     pub draw: BindGroupLayout,

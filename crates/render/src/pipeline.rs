@@ -80,9 +80,11 @@ impl Device {
         reads.map(|reads| match reads {
             Reads::Heights => &self.layouts.heights,
             Reads::Pyramid => &self.layouts.pyramid,
-            Reads::Cone | Reads::ConeTexel | Reads::RelaxedCone | Reads::RelaxedConeTexel => {
-                &self.layouts.cells
-            }
+            Reads::Cone
+            | Reads::ConeTexel
+            | Reads::RelaxedCone
+            | Reads::RelaxedConeTexel
+            | Reads::Distance => &self.layouts.cells,
         })
     }
 

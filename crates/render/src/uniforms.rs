@@ -81,6 +81,20 @@ pub struct HorizonInfo {
     pub azimuths: u32,
 }
 
+/// Twin of `DistanceInfo` in `shaders_wgsl/bindings/distance.wgsl`.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub struct DistanceInfo {
+    /// Length of one unit of u, v and height, mesh units.
+    pub metric: [f32; 3],
+    /// What code 1 stands for, mesh units.
+    pub unit: f32,
+    /// Voxels along u, v and the height.
+    pub size: [u32; 3],
+    /// Padding.
+    pub pad_0: u32,
+}
+
 /// Twin of `HeightInfo` in `shaders_wgsl/lib/height_info.wgsl`.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]

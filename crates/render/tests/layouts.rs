@@ -5,7 +5,8 @@
 use std::mem::offset_of;
 
 use render::uniforms::{
-    DrawInfo, FrameInfo, HeightInfo, HorizonInfo, LightInfo, MarchResult, MarchSegment, MaterialInfo,
+    DistanceInfo, DrawInfo, FrameInfo, HeightInfo, HorizonInfo, LightInfo, MarchResult, MarchSegment,
+    MaterialInfo,
 };
 use shaders::{Field, Layout};
 
@@ -54,6 +55,8 @@ fn host_structs_match() {
     );
     let horizon = shaders::compose_with_horizon("sloped", None, Some("bump")).unwrap();
     check(layout!(HorizonInfo: tile_size, softness, azimuths), &horizon, "HorizonInfo");
+    let distance = shaders::compose("kernels/march", Some("distance"), None).unwrap();
+    check(layout!(DistanceInfo: metric, unit, size, pad_0), &distance, "DistanceInfo");
     let march = shaders::compose("kernels/march", Some("exact"), None).unwrap();
     check(layout!(MarchSegment: start, cos_theta, delta, unused), &march, "MarchSegment");
     check(layout!(MarchResult: tau, status, steps, unused), &march, "MarchResult");

@@ -82,6 +82,7 @@ pub mod binary;
 pub mod cone;
 pub mod cone_texel;
 pub mod cone_walk;
+pub mod distance;
 pub mod exact;
 pub mod interval;
 pub mod layers;
@@ -111,5 +112,6 @@ pub static REGISTRY: &[&TechniqueInfo] = &[
     &relaxed_cone_texel::INFO,
     &cone::INFO,
     &relaxed_cone::INFO,
+    &distance::INFO,
     &exact::INFO,
 ];

@@ -1,7 +1,7 @@
 //! Maps, rays and an independent reference shared by the tests.
 #![allow(dead_code)]
 
-use heightfield::{ConeKind, ConeMap, HeightField, Wrap};
+use heightfield::{ConeKind, ConeMap, DistanceMap, HeightField, Wrap};
 
 /// A small deterministic generator (SplitMix64), so that every failure can be repeated.
 pub struct Random(pub u64);
@@ -145,10 +145,13 @@ pub fn walk(field: &HeightField, origin: [f64; 3], direction: [f64; 3], reach: f
     None
 }
 
-/// Attaches baked maps that promise nothing, as there are no bakes here: cones that do not open.
+/// Attaches baked maps that promise nothing, as there are no bakes here: cones that do not open, and
+/// distances of nothing.
 pub fn attach_baked(field: &HeightField) {
     for kind in ConeKind::ALL {
         let closed = vec![0.0; field.width() * field.height()];
         field.attach_cone_map(ConeMap::new(field, kind, &closed).unwrap());
     }
+    let nothing = vec![0.0; field.width() * field.height()];
+    field.attach_distance_map(DistanceMap::new(field, 1, &nothing).unwrap());
 }

@@ -1,0 +1,116 @@
+// Sphere tracing through a distance map: each step goes as far as the ball around the ray is empty, or to the
+// cell's wall after the bilinear cell was solved in closed form. Donnelly 2005 (GPU Gems 2, chapter 8).
+//
+// start, delta: texture-space segment (u, v, z); cos_theta: cosine between ray and normal.
+// Twin of crates/heightfield/src/search/distance.rs.
+#import "lib/found.wgsl"
+#import "lib/bilinear.wgsl"
+#import "lib/walk_axis.wgsl"
+#import "bindings/distance.wgsl"
+
+override steps: i32 = 16384;
+
+// Farther than this, in cells, 32 bits no longer tell cells apart.
+const FARTHEST: f32 = 1e9;
+// Farther from the surface than this, a start is not on it.
+const ON_SURFACE: f32 = 1e-3;
+// A light ray that enters a cell this close to its surface still leaves the point it started from.
+const STILL_ON_SURFACE: f32 = 9.5e-7;
+// What rounding of the position costs a step, as a share of the way that the ray came, and of the step.
+const DRIFT: f32 = 9.5e-7;
+
+// The texel of `n` whose footprint holds a point of a cell.
+fn footprint(cell: u32, local: f32, n: i32) -> i32 {
+    let nearest = i32(cell) + height_info.first_texel + select(0, 1, local >= 0.5);
+    if height_info.wrap == 1u {
+        return clamp(nearest, 0, n - 1);
+    }
+    if height_info.wrap == 0u {
+        return nearest % n;
+    }
+    let place = nearest % (2 * n);
+    return select(2 * n - 1 - place, place, place < n);
+}
+
+// The least distance to the surface, mesh units, from a point of a cell at height z.
+fn least_distance(cell: vec2u, local: vec2f, z: f32) -> f32 {
+    let size = vec3i(distances.info.size);
+    let slice = clamp(i32(z * f32(size.z)), 0, size.z - 1);
+    let row = slice * size.y + footprint(cell.y, local.y, size.y);
+    let at = u32(row * size.x + footprint(cell.x, local.x, size.x));
+    let code = (distances.codes[at / 2u] >> (16u * (at % 2u))) & 0xffffu;
+    return f32(code) * distances.info.unit;
+}
+
+fn trace(start: vec3f, delta: vec3f, from_surface: bool) -> Found {
+    let periodic = height_info.wrap != 1u;
+    let direction = vec3f(delta.xy * height_info.size, delta.z);
+    let dz = direction.z;
+    if !(max(abs(direction.x), abs(direction.y)) < FARTHEST) {
+        return found_unconverged(0.0, 0u);
+    }
+    let position = start.xy * height_info.size - 0.5 - f32(height_info.first_texel);
+    var x = walk_axis_new(position.x, direction.x, height_info.cells.x, periodic);
+    var y = walk_axis_new(position.y, direction.y, height_info.cells.y, periodic);
+    let inverse_speed = 1.0 / max(length(delta * distances.info.metric), 1e-30);
+    let stride = height_info.cells.x + 1u;
+    var z_start = start.z;
+    var t = 0.0;
+    for (var i = 1; i <= steps; i++) {
+        let cell = vec2u(walk_axis_id(x), walk_axis_id(y));
+        let at = cell.y * stride + cell.x;
+        let heights = vec4f(corners[at], corners[at + 1u], corners[at + stride], corners[at + stride + 1u]);
+        let local = vec2f(walk_axis_local(x, t), walk_axis_local(y, t));
+        let ray = cell_ray(heights, local, z_start + dz * t, t, direction);
+        var gap = ray.gap;
+        if from_surface && i == 1 && abs(gap) <= ON_SURFACE {
+            z_start -= gap;
+            gap = 0.0;
+        }
+        let on_surface = from_surface && abs(gap) <= STILL_ON_SURFACE;
+        if gap <= 0.0 && !on_surface {
+            return found_hit(t, u32(i));
+        }
+        let exit_x = walk_axis_exit(x);
+        let exit_y = walk_axis_exit(y);
+        let exit = min(exit_x, exit_y);
+        let free = least_distance(cell, local, z_start + dz * t) * inverse_speed;
+        let jump = t + (free * (1.0 - DRIFT) - t * DRIFT);
+        if jump > exit {
+            t = min(jump, NEVER);
+            x.cell = walk_axis_place(x, t);
+            y.cell = walk_axis_place(y, t);
+        } else {
+            var s: f32;
+            if on_surface {
+                s = root_from_surface(ray, exit - t);
+            } else {
+                s = cell_root(ray, exit - t);
+            }
+            if s >= 0.0 {
+                return found_hit(t + s, u32(i));
+            }
+            t = max(t, exit);
+            if exit_x <= exit_y {
+                x.cell = walk_axis_next(x);
+            } else {
+                y.cell = walk_axis_next(y);
+            }
+        }
+        // A falling ray meets the floor; the others end with their segment.
+        if t >= NEVER || (dz >= 0.0 && t > 1.0) {
+            return found_left(u32(i));
+        }
+    }
+    return found_unconverged(min(t, 1.0), u32(steps));
+}
+
+fn search(start: vec3f, delta: vec3f, cos_theta: f32) -> Found {
+    return trace(start, delta, false);
+}
+
+fn occluded(start: vec3f, delta: vec3f, cos_theta: f32) -> bool {
+    let found = trace(start, delta, true);
+    // What lies beyond the light throws no shadow.
+    return found.status == 0u && found.tau <= 1.0;
+}
