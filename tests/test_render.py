@@ -310,7 +310,7 @@ QUAD = bw.Mesh.quad()
 REFUSED: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
     "mesh": (lambda: bw.render("quad"), TypeError, "Mesh"),
     "material": (lambda: bw.render(QUAD, 3), TypeError, "Material"),
-    "technique": (lambda: bw.render(QUAD, technique="cone"), ValueError, "relief"),
+    "technique": (lambda: bw.render(QUAD, technique="cones"), ValueError, "relief"),
     "size": (lambda: bw.render(QUAD, size=(0, 5)), ValueError, "at least 1"),
     "size 3": (lambda: bw.render(QUAD, size=(1, 2, 3)), ValueError, "size"),
     "half pixels": (lambda: bw.render(QUAD, size=1.5), TypeError, "whole"),
