@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -12,9 +14,18 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def pytest_configure() -> None:
-    """Lets children be interrupted: what a shell starts in the background inherits an ignored SIGINT."""
+    """Lets children be interrupted: what a shell starts in the background inherits an ignored SIGINT.
+
+    Costly maps are kept in a folder of these tests, not in the user's.
+    """
+    os.environ["BUMPWGPU_CACHE"] = tempfile.mkdtemp(prefix="bumpwgpu-test-cache-")
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_unconfigure() -> None:
+    """Removes that folder."""
+    shutil.rmtree(os.environ["BUMPWGPU_CACHE"], ignore_errors=True)
 
 
 @pytest.fixture(scope="session")

@@ -35,9 +35,13 @@ SIGNATURES = {
     "HeightMap.from_function": "function size * scale base tile_size wrap",
     "march": "height_map origins directions technique * device outputs from_surface out progress",
     "march_stream": "height_map chunks technique * outputs from_surface overlap",
-    "bake": "source maps * progress **options",
+    "bake": "source maps * dtype progress **options",
+    "bake_file": (
+        "source target map * bits scale base tile_size wrap channel invert height_range progress **options"
+    ),
     "Maps.save": "self folder * format bits prefix",
     "HorizonShadows": "azimuths softness",
+    "Maps.open": "folder * prefix",
     "Mesh": "positions indices uvs * normals tangents",
     "Mesh.open": "path",
     "Mesh.tangents": "self method",

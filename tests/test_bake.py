@@ -261,9 +261,9 @@ def test_refused(tmp_path: Path) -> None:
         with pytest.raises(TypeError):
             bw.bake(hm, maps)
     baked = bw.bake(hm)
-    with pytest.raises(ValueError, match="png, exr, npy"):
+    with pytest.raises(ValueError, match="png, tiff, exr, npy"):
         baked.save(tmp_path, format="gif")
-    with pytest.raises(ValueError, match="8 or 16"):
+    with pytest.raises(ValueError, match="8, 16 or 32"):
         baked.save(tmp_path, bits=12)
     for prefix in ("../up", "a\\b", "a\0b"):
         with pytest.raises(ValueError, match="prefix"):

@@ -12,11 +12,12 @@ import os as _os
 
 from . import surfaces, techniques
 from ._bumpwgpu import VERSION as __version__
-from .baking import Maps, bake
+from .baking import bake, bake_file
 from .compare import CompareResult, Recommendation, Scene, compare
 from .errors import BakeError, BumpError, BumpWarning, CompareError, MeshError, RenderError
 from .frames import Tangents, tangents
 from .heightmap import HeightMap
+from .maps import Maps
 from .marching import Hits, march
 from .mesh_maps import MeshMaps, MeshReport
 from .meshes import Mesh, MeshMaterial, Part
@@ -73,6 +74,7 @@ __all__ = [
     "TileReport",
     "__version__",
     "bake",
+    "bake_file",
     "check_normals",
     "compare",
     "dequantise",

@@ -35,6 +35,7 @@ __all__ = [
     "adapters",
     "aov_names",
     "bake_detail",
+    "bake_file",
     "bake_map",
     "bake_tangents",
     "bend_normals",
@@ -197,14 +198,26 @@ class SegmentReference:
 
 def adapters() -> list[tuple[str, str, str, str]]: ...
 def aov_names() -> list[str]: ...
+def bake_file(
+    source: _Path,
+    target: _Path,
+    map: str,
+    options: _Options,
+    dtype: str,
+    wrap: str,
+    extent: tuple[float, float, tuple[float, float]],
+    reading: tuple[int | None, tuple[float, float] | None, bool, bool],
+    progress: _Progress,
+) -> tuple[int, int, int, list[float]]: ...
 def bake_map(
     field: Field,
     map: str,
     options: _Options,
+    dtype: str,
     progress: _Progress,
     first: int,
     total: int,
-) -> list[NDArray[np.float32]]: ...
+) -> tuple[list[NDArray[Any]], list[tuple[float, float]]]: ...
 def check_normals(normals: NDArray[np.float32], wrap: str, heights: Field | None) -> dict[str, Any]: ...
 def compare_front(
     measured: Sequence[tuple[str, Sequence[float], float, float]], max_failure_rate: float
@@ -286,12 +299,13 @@ def render(
 ) -> _RenderResult: ...
 def save_map(
     map: str,
-    layers: Sequence[NDArray[np.float32]],
+    layers: Sequence[NDArray[Any]],
+    ranges: Sequence[tuple[float, float]],
     folder: _Path,
     prefix: str,
     format: str,
     bits: int,
-) -> list[Path]: ...
+) -> tuple[list[tuple[Path, int, int, str | None]], list[tuple[float, float]]]: ...
 def seams(field: Field) -> list[dict[str, Any]]: ...
 def simd_level() -> str: ...
 def surface_points(

@@ -99,9 +99,8 @@ FROM_MESH: Mapping[str, MapInfo] = MappingProxyType(
 )
 
 
-def form_of(name: str) -> str:
-    """Which pictures a map consists of, whatever it was made from."""
-    return (MAPS[name] if name in MAPS else FROM_MESH[name]).form
+#: All maps, whatever they are made from.
+ALL_MAPS: Mapping[str, MapInfo] = MappingProxyType({**MAPS, **FROM_MESH})
 
 
 def _all_options() -> dict[str, tuple[MapOption, ...]]:

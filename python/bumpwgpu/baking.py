@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from io import BytesIO
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike
 
 from . import _bumpwgpu
-from ._atomic import replace_file
-from ._checks import choice, width_and_height
+from ._checks import choice, flag, number, whole, width_and_height
 from ._map_info import MAPS as _INFO
-from ._map_info import OPTIONS, MapChannel, MapInfo, MapOption, form_of, listing, takers
-from .errors import BakeError, BumpWarning
-from .heightmap import HEIGHT_MAP_SETTINGS, HeightMap, HeightSource, Wrap
+from ._map_info import OPTIONS, MapChannel, MapInfo, MapOption, listing, takers
+from ._sidecar import SavedFile, write_sidecar
+from .errors import BumpWarning
+from .heightmap import HEIGHT_MAP_SETTINGS, HeightMap, HeightRange, HeightSource, Wrap, checked_extent
+from .maps import BakedMap, Maps
 from .meshes import Mesh
 
 __all__ = [
@@ -32,6 +32,7 @@ __all__ = [
     "Progress",
     "about",
     "bake",
+    "bake_file",
     "estimate",
 ]
 
@@ -110,136 +111,15 @@ def estimate(size: tuple[int, int], name: str, *, wrap: Wrap = "repeat", **optio
     return _bumpwgpu.map_bytes(name, list(info.complete(options).items()), width, height, wrap)
 
 
-class Maps(Mapping[str, Any]):
-    """Baked maps by name.
-
-    ``maps["normal"]``, ``["normal_xy"]`` and ``["relief"]`` are float32 arrays of shape (H, W, 3),
-    (H, W, 2) and (H, W, 4): unit normals in -1..1 (+X right, +Y up unless baked otherwise, +Z out),
-    and height in 0..1. ``maps["pyramid"]`` is a tuple of (h, w, 2) arrays, finest first: the lowest
-    and the highest point of ever larger blocks of the bilinear surface. Maps of one channel have
-    shape (H, W), stacks of slices (N, H, W); :func:`bumpwgpu.baking.about` describes each map.
-    """
-
-    __slots__ = ("_layers",)
-
-    def __init__(self, layers: dict[str, tuple[NDArray[np.float32], ...]]) -> None:
-        self._layers = layers
-
-    def __getitem__(self, name: str) -> Any:
-        layers = self._layers[name]
-        return layers if form_of(name) == "levels" else layers[0]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._layers)
-
-    def __len__(self) -> int:
-        return len(self._layers)
-
-    def __repr__(self) -> str:
-        return f"<Maps: {', '.join(f'{name} {layers[0].shape}' for name, layers in self._layers.items())}>"
-
-    def save(
-        self,
-        folder: str | os.PathLike[str],
-        *,
-        format: Literal["png", "exr", "npy"] = "png",
-        bits: Literal[8, 16] | None = None,
-        prefix: str = "",
-    ) -> list[Path]:
-        """Write every map into a folder, which is made if need be.
-
-        Each file gets a temporary name first, so an interrupted run leaves no half of one.
-
-        Parameters
-        ----------
-        folder : path
-            Where to.
-        format : {"png", "exr", "npy"}
-            PNG holds ``(n + 1) / 2`` for normals, heights as they are, and 0 in the blue channel of
-            two-channel maps; of a pyramid, minima are rounded down and maxima up. EXR and npy hold
-            the floats.
-        bits : 8, 16 or None
-            Of a PNG; None is 8. A flat normal is (128, 128, 255) in 8 bits.
-        prefix : str, default ""
-            Files are ``<prefix>_<map>.png``, levels of a pyramid ``<prefix>_pyramid_00.png``.
-
-        Returns
-        -------
-        list of Path
-            The files made.
-
-        Raises
-        ------
-        BakeError, OSError
-            A file cannot be written.
-        ValueError, TypeError
-            An unknown format, or a prefix that is no file name.
-
-        Warns
-        -----
-        BumpWarning
-            `bits` together with a format of floats.
-
-        Examples
-        --------
-        >>> import bumpwgpu as bw, tempfile
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     [path.name for path in bw.bake(bw.HeightMap([[0.0, 1.0]])).save(folder, bits=16)]
-        ['normal.png']
-        """
-        choice("format", format, ("png", "exr", "npy"))
-        if bits is not None and (isinstance(bits, bool) or bits not in (8, 16)):
-            raise ValueError(f"bits must be 8 or 16, got {bits!r}")
-        if bits is not None and format != "png":
-            _warn(f"bits={bits} has no effect: {format} files hold floats")
-        if not isinstance(prefix, str):
-            raise TypeError(f"prefix must be a string, got {type(prefix).__name__}")
-        if "/" in prefix or "\\" in prefix or "\0" in prefix:
-            raise ValueError(f"prefix must be part of a file name, got {prefix!r}")
-        target = _folder(folder)
-        made: list[Path] = []
-        for name, layers in self._layers.items():
-            if format == "npy":
-                made += _save_npy(name, layers, target, prefix)
-            else:
-                arrays = [np.require(layer, np.float32, ("C", "A")) for layer in layers]
-                depth = 32 if format == "exr" else bits or 8
-                made += _bumpwgpu.save_map(name, arrays, target, prefix, format, depth)
-        return made
-
-
 def _warn(text: str) -> None:
     warnings.warn(text, BumpWarning, stacklevel=3)
-
-
-def _folder(folder: Any) -> Path:
-    if not isinstance(folder, str | os.PathLike):
-        raise TypeError(f"folder must be a string or a path, got {type(folder).__name__}")
-    target = Path(folder)
-    if "\0" in str(target):
-        raise ValueError("folder contains a null character")
-    try:
-        target.mkdir(parents=True, exist_ok=True)
-    except FileExistsError:
-        raise BakeError(f"cannot write into {target}: it is a file, not a folder") from None
-    return target
-
-
-def _save_npy(name: str, layers: tuple[NDArray[np.float32], ...], folder: Path, prefix: str) -> list[Path]:
-    stem = f"{prefix}_{name}" if prefix else name
-    made = []
-    for level, layer in enumerate(layers):
-        path = folder / (f"{stem}_{level:02}.npy" if form_of(name) == "levels" else f"{stem}.npy")
-        data = BytesIO()
-        np.save(data, layer, allow_pickle=False)
-        made.append(replace_file(path, data.getvalue()))
-    return made
 
 
 def bake(
     source: HeightMap | HeightSource | Mesh,
     maps: str | Iterable[str] = ("normal",),
     *,
+    dtype: DTypeLike = "float32",
     progress: Progress | None = None,
     **options: Any,
 ) -> Maps:
@@ -251,6 +131,10 @@ def bake(
         The heights, or the plain mesh whose UVs the maps are for.
     maps : str or iterable of str, default ("normal",)
         Any of :data:`bumpwgpu.baking.MAPS`; of a mesh, any of :data:`bumpwgpu.mesh_maps.MESH_MAPS`.
+    dtype : {"float32", "uint8", "uint16"}
+        Type of the arrays. Integers are what files of 8 and 16 bits hold (see :meth:`Maps.save`):
+        ``(n + 1) / 2`` for normals, bounds rounded to the safe side; normals in 8 bits take a fraction
+        of the time and memory of floats.
     progress : callable or None
         Called as ``progress(done, total)``, in rows, on the calling thread; an exception from it
         stops the bake.
@@ -309,6 +193,10 @@ def bake(
     The normal of a texel is ``normalize(-dh/dx, dh/dy, 1)`` (y down) with slopes per mesh unit:
     ``scale * dh/dtexel * W / tile_size`` (Blinn 1978; Cohen, Olano, Manocha 1998).
 
+    Maps that take seconds are kept on disk and found again when heights, extent, wrap and options are
+    the same: up to 2 GiB in the user's cache folder, those used least recently go first. The environment
+    variable ``BUMPWGPU_CACHE`` names another folder, or switches it off with ``off``.
+
     Examples
     --------
     >>> import bumpwgpu as bw
@@ -316,6 +204,7 @@ def bake(
     >>> maps["normal"][0, 0].tolist(), len(maps["pyramid"])
     ([0.0, 0.0, 1.0], 4)
     """
+    numbers = _dtype(dtype)
     if progress is not None and not callable(progress):
         raise TypeError(f"progress must be callable, got {type(progress).__name__}")
     # Maps of meshes are Maps too, so that module imports this one.
@@ -323,6 +212,8 @@ def bake(
 
     source = opened(source)
     if isinstance(source, Mesh):
+        if numbers != "float32":
+            raise ValueError(f"maps of a mesh are baked as float32, not {numbers}; save() makes integers")
         return bake_mesh(source, maps, progress, options)
     names = _map_names(maps)
     settings = {name: value for name, value in options.items() if name in HEIGHT_MAP_SETTINGS}
@@ -342,12 +233,152 @@ def bake(
             _warn(
                 f"{name} has no effect: none of {', '.join(names)} takes it, only {', '.join(takers(name))}"
             )
-    rows = heights.shape[0]
-    layers = {}
+    rows, columns = heights.shape
+    about_source = {"size": [columns, rows], **_extent_of(heights)}
+    made = {}
     for at, name in enumerate(names):
-        made = _bumpwgpu.bake_map(heights._field, name, values[name], progress, at * rows, len(names) * rows)
-        layers[name] = tuple(made)
-    return Maps(layers)
+        layers, ranges = _bumpwgpu.bake_map(
+            heights._field, name, values[name], numbers, progress, at * rows, len(names) * rows
+        )
+        made[name] = BakedMap(tuple(layers), tuple(ranges), dict(values[name]), about_source)
+    return Maps(made)
+
+
+def bake_file(
+    source: str | os.PathLike[str],
+    target: str | os.PathLike[str],
+    map: str = "normal",
+    *,
+    bits: Literal[8, 16] | None = None,
+    scale: float = 0.1,
+    base: float = 1.0,
+    tile_size: float | tuple[float, float] = (1.0, 1.0),
+    wrap: Wrap = "repeat",
+    channel: int | None = None,
+    invert: bool = False,
+    height_range: HeightRange = None,
+    progress: Progress | None = None,
+    **options: Any,
+) -> Path:
+    """Make a map of a height map that memory does not hold: from file to file, by rows.
+
+    A few million texels are in memory at any time, whatever the size. The file is bit for bit what
+    :func:`bake` and :meth:`Maps.save` make, with the same sidecar beside it.
+
+    Parameters
+    ----------
+    source : path
+        The height map: ``.npy``, PNG without interlacing, or TIFF in strips or tiles.
+    target : path
+        The map: ``.png``, or ``.npy`` for floats.
+    map : {"normal", "normal_xy", "relief"}
+        Which map; others need all heights at once.
+    bits : 8, 16 or None
+        Of a PNG; None is 8.
+    scale, base, tile_size, wrap, invert, height_range
+        As for :class:`HeightMap`. ``height_range="auto"`` reads the file once more.
+    channel : int or None
+        The channel to read, needed when there are several.
+    progress : callable or None
+        Called as ``progress(done, total)``, in rows; an exception from it stops the bake.
+    **options
+        What the map takes (:func:`bumpwgpu.baking.about`).
+
+    Returns
+    -------
+    Path
+        The file made.
+
+    Raises
+    ------
+    ValueError
+        Heights or settings out of range, an unknown map, or one that needs all heights at once.
+    TypeError
+        Arguments of the wrong type, an unknown option.
+    FileNotFoundError, BakeError
+        The source is missing, damaged, or of a kind whose rows do not lie in order; the target cannot
+        be written.
+
+    Warns
+    -----
+    BumpWarning
+        Heights were clipped to 0..1.
+
+    Examples
+    --------
+    >>> import numpy as np, bumpwgpu as bw, tempfile, pathlib
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     heights = pathlib.Path(folder) / "heights.npy"
+    ...     np.save(heights, np.zeros((4, 6), np.float32))
+    ...     bw.bake_file(heights, pathlib.Path(folder) / "normal.png", bits=16).name
+    'normal.png'
+    """
+    info = about(map)
+    if progress is not None and not callable(progress):
+        raise TypeError(f"progress must be callable, got {type(progress).__name__}")
+    read, written = _file(source, "source"), _file(target, "target")
+    if written.suffix.lower() not in (".png", ".npy"):
+        raise ValueError(f"target must end in .png or .npy, got {written.name!r}")
+    if bits is not None and (isinstance(bits, bool) or bits not in (8, 16)):
+        raise ValueError(f"bits must be 8 or 16, got {bits!r}")
+    floats = written.suffix.lower() == ".npy"
+    if bits is not None and floats:
+        _warn(f"bits={bits} has no effect: npy files hold floats")
+    numbers = "float32" if floats else f"uint{bits or 8}"
+    extent = checked_extent(scale, base, tile_size)
+    choice("wrap", wrap, ("repeat", "clamp", "mirror"))
+    span: tuple[float, float] | None = None
+    if height_range is not None and not isinstance(height_range, str):
+        if not hasattr(height_range, "__len__") or len(height_range) != 2:
+            raise TypeError(f'height_range must be None, "auto" or (low, high), got {height_range!r}')
+        span = (number("height_range[0]", height_range[0]), number("height_range[1]", height_range[1]))
+    elif height_range not in (None, "auto"):
+        raise ValueError(f'height_range must be None, "auto" or (low, high), got {height_range!r}')
+    reading = (
+        None if channel is None else whole("channel", channel, 0),
+        span,
+        height_range == "auto",
+        flag("invert", invert),
+    )
+    _refuse_unknown(options, [map])
+    for name in options:
+        if info.option(name) is None:
+            _warn(f"{name} has no effect: {map} does not take it, only {', '.join(takers(name))}")
+    values = info.complete(options)
+    columns, rows, clipped, _ = _bumpwgpu.bake_file(
+        read, written, map, list(values.items()), numbers, wrap, extent, reading, progress
+    )
+    if clipped:
+        _warn(f"{read.name}: {clipped} heights outside the range were clipped to 0..1")
+    about_source = {"size": [columns, rows], **dict(zip(_EXTENT, (*extent, wrap), strict=True))}
+    ranges = [channel.range or (0.0, 1.0) for channel in info.channels]
+    shape = (rows, columns, len(info.channels))
+    file = SavedFile(written, 0, None, None)
+    write_sidecar(written.with_suffix(".json"), info, values, about_source, numbers, ranges, [shape], [file])
+    return written
+
+
+_EXTENT = ("scale", "base", "tile_size", "wrap")
+
+
+def _extent_of(heights: HeightMap) -> dict[str, Any]:
+    return {name: getattr(heights, name) for name in _EXTENT}
+
+
+def _file(path: Any, name: str) -> Path:
+    if not isinstance(path, str | os.PathLike):
+        raise TypeError(f"{name} must be a string or a path, got {type(path).__name__}")
+    if "\0" in str(path):
+        raise ValueError(f"{name} contains a null character")
+    return Path(path)
+
+
+def _dtype(dtype: Any) -> str:
+    try:
+        name = np.dtype(dtype).name
+    except TypeError:
+        raise TypeError(f"dtype must be float32, uint8 or uint16, got {dtype!r}") from None
+    return choice("dtype", name, ("float32", "uint8", "uint16"))
 
 
 def _refuse_unknown(options: Mapping[str, Any], names: list[str]) -> None:

@@ -22,6 +22,7 @@ from ._map_info import MAPS as MAP_INFO
 from ._map_info import OPTIONS, MapOption
 from .baking import MAPS
 from .baking import bake as bake_maps
+from .baking import bake_file as bake_map_file
 from .compare import ELEVATIONS, Scene
 from .compare import compare as compare_techniques
 from .errors import BumpError
@@ -66,6 +67,7 @@ class FormatChoice(Enum):
     """Values of --format."""
 
     PNG = "png"
+    TIFF = "tiff"
     EXR = "exr"
     NPY = "npy"
 
@@ -75,6 +77,7 @@ class BitsChoice(Enum):
 
     EIGHT = "8"
     SIXTEEN = "16"
+    THIRTY_TWO = "32"
 
 
 class SpaceChoice(Enum):
@@ -342,8 +345,15 @@ def bake(
     ] = "normal",
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the maps.")] = Path("maps"),
     format: Annotated[FormatChoice, typer.Option(help="File format.")] = FormatChoice.PNG,
-    bits: Annotated[BitsChoice | None, typer.Option(help="Bits a channel of a PNG.")] = None,
+    bits: Annotated[
+        BitsChoice | None,
+        typer.Option(help="Bits a sample of a PNG (8, 16) or TIFF (8, 16, 32).", show_default="8"),
+    ] = None,
     prefix: Annotated[str, typer.Option(help="First part of the file names.")] = "",
+    by_rows: Annotated[
+        bool,
+        typer.Option("--by-rows", help="For height maps larger than memory: read and write them row by row."),
+    ] = False,
     scale: _Scale = 0.1,
     base: _Base = 1.0,
     tile_size: _Tile = (1.0, 1.0),
@@ -413,17 +423,23 @@ def bake(
     options = {name: _map_option(name, text) for name, text in map_options.items() if text is not None}
     depth: Any = int(bits.value) if bits is not None else None
     span = _range(height_range)
+    settings: dict[str, Any] = {
+        "scale": scale,
+        "base": base,
+        "tile_size": tile_size,
+        "wrap": wrap.value,
+        "channel": _channel(channel),
+        "invert": invert,
+        "height_range": span,
+    }
+    if by_rows:
+        if format not in (FormatChoice.PNG, FormatChoice.NPY):
+            raise typer.BadParameter("--by-rows writes png and npy")
+        with _session(json_output, quiet, verbose) as out:
+            _bake_by_rows(out, source, wanted, output, format.value, depth, prefix, settings, options)
+        return
     with _session(json_output, quiet, verbose) as out:
-        heights = HeightMap(
-            source,
-            scale=scale,
-            base=base,
-            tile_size=tile_size,
-            wrap=wrap.value,
-            channel=_channel(channel),
-            invert=invert,
-            height_range=span,
-        )
+        heights = HeightMap(source, **settings)
         with out.progress("baking") as advance:
             made = bake_maps(heights, wanted, progress=advance, **options)
         paths = made.save(output, format=format.value, bits=depth, prefix=prefix)
@@ -435,6 +451,30 @@ def bake(
         out.result(
             {"source": str(source), "width": columns, "height": rows, "bits": heights.bits, "files": paths}
         )
+
+
+def _bake_by_rows(
+    out: _Output,
+    source: Path,
+    maps: list[str],
+    folder: Path,
+    format: str,
+    bits: Any,
+    prefix: str,
+    settings: dict[str, Any],
+    options: dict[str, Any],
+) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    files = []
+    for name in maps:
+        target = folder / f"{prefix}{'_' if prefix else ''}{name}.{format}"
+        taken = {key: value for key, value in options.items() if MAP_INFO[name].option(key)}
+        with out.progress(name) as advance:
+            files.append(
+                bake_map_file(source, target, name, bits=bits, progress=advance, **settings, **taken)
+            )
+        out.say(str(files[-1]))
+    out.result({"source": str(source), "files": files})
 
 
 @app.command()

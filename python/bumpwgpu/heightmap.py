@@ -107,7 +107,7 @@ class HeightMap:
         invert: bool = False,
         height_range: HeightRange = None,
     ) -> None:
-        self._scale, self._base, self._tile_size = _checked_extent(scale, base, tile_size)
+        self._scale, self._base, self._tile_size = checked_extent(scale, base, tile_size)
         self._wrap = _checked_wrap(wrap)
         pixels = _read(source)
         for text in pixels.warnings:
@@ -265,7 +265,7 @@ class HeightMap:
         0.5
         """
         made = object.__new__(HeightMap)
-        made._scale, made._base, made._tile_size = _checked_extent(
+        made._scale, made._base, made._tile_size = checked_extent(
             self._scale if scale is None else scale,
             self._base if base is None else base,
             self._tile_size if tile_size is None else tile_size,
@@ -385,7 +385,8 @@ def _pair(name: str, value: Any) -> tuple[float, float]:
     return (number(f"{name}[0]", value[0]), number(f"{name}[1]", value[1]))
 
 
-def _checked_extent(scale: Any, base: Any, tile_size: Any) -> tuple[float, float, tuple[float, float]]:
+def checked_extent(scale: Any, base: Any, tile_size: Any) -> tuple[float, float, tuple[float, float]]:
+    """Scale, base and tile size as the core takes them."""
     scale, base, tile_size = number("scale", scale), number("base", base), _pair("tile_size", tile_size)
     if scale < 0.0:
         raise ValueError(f"scale must not be negative, got {scale:g}; for depth maps use invert=True")
@@ -489,6 +490,8 @@ def _normalise(plane: NDArray[Any], height_range: Any, label: str) -> tuple[NDAr
     kind = plane.dtype.kind
     if kind not in "buif":
         raise TypeError(f"{label} must hold numbers, got dtype {plane.dtype}")
+    # Files of the other byte order hold the same numbers.
+    plane = np.asarray(plane, plane.dtype.newbyteorder("="))
     if kind == "f":
         _require_finite(plane, label)
     bits = _effective_bits(plane)

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from . import _bumpwgpu
 from ._checks import choice, flag, number, strings, whole, width_and_height
-from .baking import Maps
+from ._map_info import ALL_MAPS
 from .errors import BumpWarning
 from .heightmap import HeightMap
+from .maps import BakedMap, Maps
 from .meshes import Mesh
 
 __all__ = ["MESH_MAPS", "MeshMaps", "MeshReport"]
@@ -105,8 +106,24 @@ class MeshMaps(Maps):
     __slots__ = ("report",)
     report: MeshReport | None
 
-    def __init__(self, layers: dict[str, NDArray[np.float32]], report: MeshReport | None) -> None:
-        super().__init__({name: (layer,) for name, layer in layers.items()})
+    def __init__(
+        self,
+        layers: dict[str, NDArray[np.float32]],
+        report: MeshReport | None,
+        options: Mapping[str, Any],
+    ) -> None:
+        settings = {name: value for name, value in options.items() if name not in ("detail", "cage", "size")}
+        extent = {}
+        if report is not None:
+            # What puts the heights back on the plain mesh.
+            span = report.front + report.rear
+            extent = {"scale": span, "base": report.rear / span if span > 0.0 else 0.0, "wrap": "clamp"}
+        made = {}
+        for name, layer in layers.items():
+            ranges = tuple(channel.range or (0.0, 1.0) for channel in ALL_MAPS[name].channels)
+            source = {"size": [layer.shape[1], layer.shape[0]], **extent}
+            made[name] = BakedMap((layer,), ranges, settings, source)
+        super().__init__(made)
         self.report = report
 
     def height_map(self) -> HeightMap:
@@ -168,7 +185,7 @@ def bake_mesh(
             warnings.warn(text, BumpWarning, stacklevel=3)
     if "tangents" in names:
         layers["tangents"] = _bumpwgpu.bake_tangents(mesh._core, size, padding, progress)
-    return MeshMaps({name: layers[name] for name in names}, report)
+    return MeshMaps({name: layers[name] for name in names}, report, options)
 
 
 def opened(source: Any) -> Any:

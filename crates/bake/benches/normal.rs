@@ -2,6 +2,8 @@
 
 use std::hint::black_box;
 
+use bake::encode::Depth;
+use bake::maps::{Map, bake_encoded};
 use bake::{Convention, Kernel, Progress, normal_map};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use heightfield::{Extent, HeightField, Wrap};
@@ -40,6 +42,13 @@ fn normals(criterion: &mut Criterion) {
     });
     for kernel in Kernel::ALL {
         group.bench_function(kernel.name(), |bencher| bencher.iter(|| black_box(bake(kernel))));
+    }
+    let Ok(normal) = Map::named("normal") else { unreachable!("normal is a map") };
+    let options = normal.info.defaults();
+    for (name, depth) in [("rgb8", Depth::U8), ("rgb16", Depth::U16)] {
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| black_box(bake_encoded(&field, normal, &options, depth, Progress::none())));
+        });
     }
     group.finish();
 }

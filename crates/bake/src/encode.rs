@@ -13,6 +13,9 @@
 //! flat normal (128, 128, 255), or (32768, 32768, 65535), as every other tool writes it. The way
 //! back is the one that glTF and graphics hardware use, so the flat normal comes back as
 //! (0.0039, 0.0039, 1). Values outside the range are clamped and NaN becomes the lower end.
+//!
+//! 8-bit normals are rounded in single precision, so that a bake can do it as it goes: what lies
+//! within 2^-15 of a step of halfway may go either way.
 
 use rayon::prelude::*;
 
@@ -60,6 +63,16 @@ pub enum Depth {
     U16,
 }
 
+impl Depth {
+    /// Bytes of an integer.
+    pub fn bytes(self) -> usize {
+        match self {
+            Depth::U8 => 1,
+            Depth::U16 => 2,
+        }
+    }
+}
+
 impl Range {
     /// -1..1, a normal's component.
     pub const SIGNED: Self = Self { low: -1.0, high: 1.0, rounding: Rounding::Nearest };
@@ -75,6 +88,11 @@ impl Range {
     pub fn encode(self, value: f32, max: u16) -> u16 {
         if self.low >= self.high {
             return 0;
+        }
+        if self == Self::SIGNED && matches!(max, 255 | u16::MAX) {
+            // NaN is not above -1 either.
+            let value = if value > -1.0 { value.min(1.0) } else { -1.0 };
+            return if max == 255 { u8::signed(value).into() } else { u16::signed(value) };
         }
         let wide = f64::from(max);
         let scaled = (f64::from(value) - f64::from(self.low)) * (wide / self.width());
@@ -106,6 +124,53 @@ impl Range {
     #[inline]
     fn width(self) -> f64 {
         f64::from(self.high) - f64::from(self.low)
+    }
+}
+
+/// A number type in which normals and heights can be baked: floats as they are, integers as
+/// [`Range::encode`] gives them.
+pub trait Sample: Copy + Default + Send + Sync + 'static {
+    /// A number of -1..1 (rounding may exceed that by some 1e-7).
+    fn signed(value: f32) -> Self;
+    /// A number of 0..1.
+    fn unit(value: f32) -> Self;
+}
+
+impl Sample for f32 {
+    #[inline(always)]
+    fn signed(value: f32) -> Self {
+        value
+    }
+
+    #[inline(always)]
+    fn unit(value: f32) -> Self {
+        value
+    }
+}
+
+impl Sample for u8 {
+    #[inline(always)]
+    fn signed(value: f32) -> Self {
+        // From 256 to 512 the eight bits below the exponent are the whole part: the code and 256.
+        ((value * 127.5 + 384.0).to_bits() >> 15) as u8
+    }
+
+    #[inline(always)]
+    fn unit(value: f32) -> Self {
+        (f64::from(value) * 255.0 + 0.5) as u8
+    }
+}
+
+impl Sample for u16 {
+    #[inline(always)]
+    fn signed(value: f32) -> Self {
+        // As for `u8`, with 36 bits left below the whole part.
+        ((f64::from(value) * 32767.5 + 98304.0).to_bits() >> 36) as u16
+    }
+
+    #[inline(always)]
+    fn unit(value: f32) -> Self {
+        (f64::from(value) * 65535.0 + 0.5) as u16
     }
 }
 
@@ -223,6 +288,23 @@ mod tests {
             prop_assert!(down <= value && f64::from(value - down) <= step);
             prop_assert!(up >= value && f64::from(up - value) <= step);
             prop_assert!(f64::from((near - value).abs()) <= 0.5 * step);
+        }
+    }
+
+    #[test]
+    fn samples_are_encoded_alike() {
+        // All floats of 2^-24 to 1 with a few mantissas each, and their negatives.
+        for bits in (0x3380_0000_u32..=0x3f80_0000).step_by(997).chain([0, 0x3f80_0000]) {
+            let value = f32::from_bits(bits);
+            for signed in [value, -value] {
+                // The rule of the table in double precision.
+                assert_eq!(u16::signed(signed), (f64::from(signed) * 32767.5 + 32768.0) as u16);
+                let exact = f64::from(signed) * 127.5 + 128.0;
+                let halfway = (exact - exact.round()).abs() < 1.0 / 32768.0;
+                assert!(halfway || u8::signed(signed) == exact as u8, "{signed:e}");
+            }
+            assert_eq!(u16::from(u8::unit(value)), Range::UNIT.encode(value, 255), "{value:e}");
+            assert_eq!(u16::unit(value), Range::UNIT.encode(value, u16::MAX), "{value:e}");
         }
     }
 

@@ -107,6 +107,12 @@ pub enum BakeError {
         /// What is wrong, and what is taken.
         problem: String,
     },
+    /// Heights of a file that is read by rows make no sense, or a map cannot be made by rows.
+    #[error("{problem}")]
+    Stream {
+        /// What is wrong, where, and what would work.
+        problem: String,
+    },
     /// A map would not fit into memory; nothing was allocated.
     #[error("{what} needs {bytes} bytes; {available} bytes of memory are available")]
     Memory {

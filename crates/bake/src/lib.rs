@@ -9,6 +9,7 @@
 //! map is saved.
 
 pub mod bits;
+pub mod cache;
 pub mod cone;
 pub mod curvature;
 pub mod distance;
@@ -32,9 +33,11 @@ pub mod repair;
 mod resample;
 mod rows;
 pub mod slopes;
+pub mod stream;
 mod sweep;
 
 pub use bits::effective_bits;
+pub use cache::{Cache, bake_cached};
 pub use cone::{ConeMode, cone_map, relaxed_cone_map};
 pub use curvature::curvature;
 pub use distance::distance_map;
@@ -44,8 +47,8 @@ pub use horizon::{azimuth, horizon_map};
 pub use image::{Image, Samples};
 pub use kernel::Kernel;
 pub use maps::{
-    Baked, Channel, FileFormat, Form, Grid, Kind, Layer, Map, MapInfo, MapOption, Options, Plan, Span, Value,
-    bake, save,
+    Baked, Channel, Encoded, EncodedLayer, FileFormat, Form, Grid, Kind, Layer, Map, MapInfo, MapOption,
+    Options, Plan, Span, Value, bake, bake_encoded, bake_rows, save,
 };
 pub use mips::{NormalLength, mip_chain, mip_sizes, normal_mips};
 pub use moments::{covariance, half_vector_density, moments, toksvig_roughness};
@@ -56,3 +59,4 @@ pub use provide::{provide, provide_for};
 pub use pyramid::{Level, pyramid};
 pub use relief::relief_map;
 pub use slopes::slopes;
+pub use stream::{HeightSettings, StreamRequest, Streamed, Values, bake_file};

@@ -30,7 +30,7 @@ use crate::encode::{Range, Rounding};
 use crate::maps::{Channel, Form, Kind, Layer, Map, MapInfo, MapOption};
 use crate::mips::{mip_chain, plan};
 use crate::normal::{self, Factors};
-use crate::rows::for_each_row;
+use crate::rows::{Block, Fill, for_each_row};
 use crate::{BakeError, Convention, Kernel, Progress, normal_map};
 
 /// LEAN moments.
@@ -94,17 +94,29 @@ pub fn moments(
     convention: Convention,
     mut progress: Progress<'_>,
 ) -> Result<Vec<Layer>, BakeError> {
-    let factors = Factors::new(field, convention);
+    let factors = Factors::of(field, convention);
     let (width, height) = (field.width(), field.height());
     let mut map = vec![0.0; width * height * 5];
-    for_each_row(field, kernel, &mut map, &mut progress, |row, out, _| {
-        for (i, texel) in out.chunks_exact_mut(5).enumerate() {
-            let [x, y] = factors.slopes(row.gx[i], row.gy[i]);
-            texel.copy_from_slice(&[x, y, x * x, x * y, y * y]);
-        }
-    })?;
+    for_each_row(field, kernel, &mut map, &mut progress, &SlopeMoments { factors })?;
     // The slopes were the work; the chain reads them once more.
     mip_chain(map, width, height, 5, Progress::none())
+}
+
+struct SlopeMoments {
+    factors: Factors,
+}
+
+impl Fill for SlopeMoments {
+    type Sample = f32;
+    const SAMPLES: usize = 5;
+
+    #[inline(always)]
+    fn fill(&self, block: &Block<'_>, out: &mut [f32]) {
+        for ((texel, &gx), &gy) in out.as_chunks_mut::<5>().0.iter_mut().zip(block.gx).zip(block.gy) {
+            let [x, y] = self.factors.slopes(gx, gy);
+            *texel = [x, y, x * x, x * y, y * y];
+        }
+    }
 }
 
 /// Covariance `[xx, xy, yy]` of the slopes under a texel of [`moments`]; `xx` and `yy` not below 0.

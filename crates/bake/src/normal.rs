@@ -8,11 +8,13 @@
 //! because `y = -v`. The DirectX convention stores `-y` in green. Source: Blinn 1978, "Simulation
 //! of wrinkled surfaces"; Cohen, Olano, Manocha 1998 for normals kept in a map.
 
-use heightfield::HeightField;
+use std::marker::PhantomData;
 
-use crate::encode::Range;
+use heightfield::{Extent, HeightField};
+
+use crate::encode::{Range, Sample};
 use crate::maps::{Channel, Form, Kind, Layer, Map, MapInfo, MapOption, Options, Plan};
-use crate::rows::{Row, for_each_row};
+use crate::rows::{BLOCK, Block, Fill, for_each_row};
 use crate::{BakeError, Kernel, Progress};
 
 /// Steepest slope kept, as the tangent of the angle: its square still fits a float, so a senseless
@@ -129,36 +131,99 @@ pub(crate) struct Factors {
 }
 
 impl Factors {
-    pub(crate) fn new(field: &HeightField, convention: Convention) -> Self {
-        let extent = field.extent();
-        let factor = |texels: usize, tile: f32| {
-            (f64::from(extent.scale) * texels as f64 / f64::from(tile)).min(STEEPEST) as f32
+    pub(crate) fn of(field: &HeightField, convention: Convention) -> Self {
+        Self::new([field.width(), field.height()], field.extent(), convention)
+    }
+
+    pub(crate) fn new(size: [usize; 2], extent: &Extent, convention: Convention) -> Self {
+        let factor = |axis: usize| {
+            let tile = f64::from(extent.tile_size[axis]);
+            (f64::from(extent.scale) * size[axis] as f64 / tile).min(STEEPEST) as f32
         };
-        let y = factor(field.height(), extent.tile_size[1]);
-        Self {
-            x: -factor(field.width(), extent.tile_size[0]),
-            y: if convention == Convention::OpenGl { y } else { -y },
-        }
+        let y = factor(1);
+        Self { x: -factor(0), y: if convention == Convention::OpenGl { y } else { -y } }
     }
 
     /// Slopes of the normal, `nx / nz` and `ny / nz`, from height per texel.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn slopes(self, gx: f32, gy: f32) -> [f32; 2] {
         // Adding 0 turns -0 into 0: a flat map has no sign.
         [gx * self.x + 0.0, gy * self.y + 0.0]
     }
 
-    /// Normal components of a row.
-    pub(crate) fn normals(self, row: &Row<'_>, normal: &mut [Vec<f32>; 3]) {
-        let [nx, ny, nz] = normal;
-        let n = nx.len();
-        let (gx, gy, ny, nz) = (&row.gx[..n], &row.gy[..n], &mut ny[..n], &mut nz[..n]);
+    /// Normals of some columns in single precision, each component by itself.
+    #[inline(always)]
+    fn components<S: Sample>(self, block: &Block<'_>, x: &mut [S], y: &mut [S], z: &mut [S]) {
+        let n = block.gx.len();
+        let (gx, gy, x, y, z) = (block.gx, &block.gy[..n], &mut x[..n], &mut y[..n], &mut z[..n]);
         for i in 0..n {
-            let [x, y] = self.slopes(gx[i], gy[i]);
-            let inverse = 1.0 / (x * x + y * y + 1.0).sqrt();
-            nx[i] = x * inverse;
-            ny[i] = y * inverse;
-            nz[i] = inverse;
+            let [nx, ny] = self.slopes(gx[i], gy[i]);
+            let inverse = 1.0 / (nx * nx + ny * ny + 1.0).sqrt();
+            x[i] = S::signed(nx * inverse);
+            y[i] = S::signed(ny * inverse);
+            z[i] = S::signed(inverse);
+        }
+    }
+}
+
+/// Fills texels of `C` samples: x, y; then z from three on; then the height.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Normals<S, const C: usize> {
+    factors: Factors,
+    sample: PhantomData<S>,
+}
+
+impl<S: Sample, const C: usize> Normals<S, C> {
+    pub(crate) fn new(factors: Factors) -> Self {
+        Self { factors, sample: PhantomData }
+    }
+
+    /// The whole map.
+    pub(crate) fn bake(
+        self,
+        field: &HeightField,
+        kernel: Kernel,
+        progress: Progress<'_>,
+    ) -> Result<Vec<S>, BakeError> {
+        let mut map = vec![S::default(); field.width() * field.height() * C];
+        self.bake_into(field, kernel, &mut map, progress)?;
+        Ok(map)
+    }
+
+    /// The whole map into memory of the caller's, `height * width * C` samples.
+    pub(crate) fn bake_into(
+        self,
+        field: &HeightField,
+        kernel: Kernel,
+        map: &mut [S],
+        mut progress: Progress<'_>,
+    ) -> Result<(), BakeError> {
+        for_each_row(field, kernel, map, &mut progress, &self)
+    }
+}
+
+impl<S: Sample, const C: usize> Fill for Normals<S, C> {
+    type Sample = S;
+    const SAMPLES: usize = C;
+
+    #[inline(always)]
+    fn fill(&self, block: &Block<'_>, out: &mut [S]) {
+        let n = block.gx.len();
+        let [mut x, mut y, mut z] = [[S::default(); BLOCK]; 3];
+        self.factors.components(block, &mut x, &mut y, &mut z);
+        let (x, y, z, heights) = (&x[..n], &y[..n], &z[..n], &block.heights[..n]);
+        let (texels, _) = out.as_chunks_mut::<C>();
+        let texels = &mut texels[..n];
+        for i in 0..n {
+            let texel = &mut texels[i];
+            texel[0] = x[i];
+            texel[1] = y[i];
+            if C > 2 {
+                texel[2] = z[i];
+            }
+            if C > 3 {
+                texel[3] = S::unit(heights[i]);
+            }
         }
     }
 }
@@ -171,20 +236,9 @@ pub fn normal_map(
     field: &HeightField,
     kernel: Kernel,
     convention: Convention,
-    mut progress: Progress<'_>,
+    progress: Progress<'_>,
 ) -> Result<Vec<f32>, BakeError> {
-    let factors = Factors::new(field, convention);
-    let mut map = vec![0.0; field.width() * field.height() * 3];
-    for_each_row(field, kernel, &mut map, &mut progress, |row, out, normal| {
-        factors.normals(row, normal);
-        let [nx, ny, nz] = normal;
-        for (((texel, x), y), z) in out.chunks_exact_mut(3).zip(nx).zip(ny).zip(nz) {
-            texel[0] = *x;
-            texel[1] = *y;
-            texel[2] = *z;
-        }
-    })?;
-    Ok(map)
+    Normals::<f32, 3>::new(Factors::of(field, convention)).bake(field, kernel, progress)
 }
 
 /// The normal map without z, `height * width * 2` floats in -1..1; `z = sqrt(1 - x^2 - y^2)`.
@@ -195,17 +249,7 @@ pub fn normal_xy(
     field: &HeightField,
     kernel: Kernel,
     convention: Convention,
-    mut progress: Progress<'_>,
+    progress: Progress<'_>,
 ) -> Result<Vec<f32>, BakeError> {
-    let factors = Factors::new(field, convention);
-    let mut map = vec![0.0; field.width() * field.height() * 2];
-    for_each_row(field, kernel, &mut map, &mut progress, |row, out, normal| {
-        factors.normals(row, normal);
-        let [nx, ny, _] = normal;
-        for ((texel, x), y) in out.chunks_exact_mut(2).zip(nx).zip(ny) {
-            texel[0] = *x;
-            texel[1] = *y;
-        }
-    })?;
-    Ok(map)
+    Normals::<f32, 2>::new(Factors::of(field, convention)).bake(field, kernel, progress)
 }

@@ -20,7 +20,7 @@ use crate::encode::Range;
 use crate::horizon::{azimuth, azimuths_option, check_azimuths};
 use crate::maps::{Channel, Form, Grid, Map, MapInfo, Plan};
 use crate::normal::{OPTIONS, settings, single};
-use crate::rows::for_each_row;
+use crate::rows::{Block, Fill, for_each_row};
 use crate::sweep::{Grids, Lines, RowScratch, Sweep, transposed, working_bytes};
 use crate::{BakeError, Convention, Kernel, Progress};
 
@@ -190,11 +190,25 @@ fn slopes(field: &HeightField, kernel: Kernel, sky: &mut [Sky]) -> Result<(), Ba
     };
     let x = factor(field.width(), extent.tile_size[0]);
     let y = -factor(field.height(), extent.tile_size[1]);
-    for_each_row(field, kernel, sky, &mut Progress::none(), |row, out, _| {
-        for ((sky, gx), gy) in out.iter_mut().zip(row.gx).zip(row.gy) {
-            sky.slope = [gx * x, gy * y];
+    for_each_row(field, kernel, sky, &mut Progress::none(), &SkySlopes { x, y })
+}
+
+/// Height per texel to mesh-space slopes.
+struct SkySlopes {
+    x: f32,
+    y: f32,
+}
+
+impl Fill for SkySlopes {
+    type Sample = Sky;
+    const SAMPLES: usize = 1;
+
+    #[inline(always)]
+    fn fill(&self, block: &Block<'_>, out: &mut [Sky]) {
+        for ((sky, gx), gy) in out.iter_mut().zip(block.gx).zip(block.gy) {
+            sky.slope = [gx * self.x, gy * self.y];
         }
-    })
+    }
 }
 
 /// Adds one azimuth's open directions to a row of texels.

@@ -10,12 +10,13 @@ use crate::BakeError;
 #[derive(Default)]
 pub struct Progress<'a> {
     callback: Option<&'a mut dyn FnMut(usize, usize) -> bool>,
+    last: (usize, usize),
 }
 
 impl<'a> Progress<'a> {
     /// Reports to `callback`, which returns `false` to stop.
     pub fn new(callback: &'a mut dyn FnMut(usize, usize) -> bool) -> Self {
-        Self { callback: Some(callback) }
+        Self { callback: Some(callback), last: (0, 0) }
     }
 
     /// Reports to nobody.
@@ -28,7 +29,17 @@ impl<'a> Progress<'a> {
     /// # Errors
     /// [`BakeError::Interrupted`] when the caller asked to stop.
     pub fn report(&mut self, done: usize, total: usize) -> Result<(), BakeError> {
+        self.last = (done, total);
         let go_on = self.callback.as_mut().is_none_or(|callback| callback(done, total));
         if go_on { Ok(()) } else { Err(BakeError::Interrupted) }
+    }
+
+    /// Asks whether to go on, without having come further.
+    ///
+    /// # Errors
+    /// [`BakeError::Interrupted`] when the caller asked to stop.
+    pub fn check(&mut self) -> Result<(), BakeError> {
+        let (done, total) = self.last;
+        self.report(done, total)
     }
 }

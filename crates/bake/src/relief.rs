@@ -8,8 +8,7 @@ use heightfield::HeightField;
 
 use crate::encode::Range;
 use crate::maps::{Channel, Form, Map, MapInfo, Plan};
-use crate::normal::{Factors, OPTIONS, settings, single};
-use crate::rows::for_each_row;
+use crate::normal::{Factors, Normals, OPTIONS, settings, single};
 use crate::{BakeError, Convention, Kernel, Progress};
 
 /// Normal x, y, z and height.
@@ -44,19 +43,7 @@ pub fn relief_map(
     field: &HeightField,
     kernel: Kernel,
     convention: Convention,
-    mut progress: Progress<'_>,
+    progress: Progress<'_>,
 ) -> Result<Vec<f32>, BakeError> {
-    let factors = Factors::new(field, convention);
-    let mut map = vec![0.0; field.width() * field.height() * 4];
-    for_each_row(field, kernel, &mut map, &mut progress, |row, out, normal| {
-        factors.normals(row, normal);
-        let [nx, ny, nz] = normal;
-        for ((((texel, x), y), z), h) in out.chunks_exact_mut(4).zip(nx).zip(ny).zip(nz).zip(row.heights) {
-            texel[0] = *x;
-            texel[1] = *y;
-            texel[2] = *z;
-            texel[3] = *h;
-        }
-    })?;
-    Ok(map)
+    Normals::<f32, 4>::new(Factors::of(field, convention)).bake(field, kernel, progress)
 }

@@ -1,10 +1,11 @@
 //! The row engine behind every map that needs slopes.
 //!
-//! Rows run in parallel in batches. A row is computed from slices only: a vertical pass over
-//! neighbouring rows, then a horizontal pass over the result, whose few border columns are filled
-//! in by the wrap rule. The inner loops hold no wrap and no branch, so they vectorise.
+//! Rows run in parallel in batches. A row is computed from the five rows around it, block of columns
+//! by block of columns, so that all that is in between stays in the nearest cache: a vertical pass
+//! over the rows, then a horizontal one over the result, whose few border columns are filled in by
+//! the wrap rule. The inner loops hold no wrap and no branch, so they vectorise.
 
-use heightfield::HeightField;
+use heightfield::{HeightField, Wrap};
 use rayon::prelude::*;
 
 use crate::kernel::{Kernel, Taps};
@@ -12,13 +13,19 @@ use crate::{BakeError, Progress};
 
 /// Texels between two progress reports.
 const BATCH_TEXELS: usize = 1 << 20;
-/// Texels one task handles, so that its rows stay in the cache.
+/// Texels one task handles.
 const TASK_TEXELS: usize = 1 << 15;
+/// Columns handled at a time.
+pub(crate) const BLOCK: usize = 512;
 /// The largest reach of a kernel.
-const REACH: usize = 2;
+pub(crate) const REACH: usize = 2;
 
-/// One row of the height field with its gradient.
-pub(crate) struct Row<'a> {
+/// A row of the height field and its two neighbours on either side, from the one above to the one
+/// below; all have the width of the map.
+pub(crate) type Rows<'a> = [&'a [f32]; 2 * REACH + 1];
+
+/// Some columns of a row, at most [`BLOCK`], with their gradient.
+pub(crate) struct Block<'a> {
     /// `dh/dx`, height per texel.
     pub gx: &'a [f32],
     /// `dh/dy` downwards, height per texel.
@@ -27,50 +34,41 @@ pub(crate) struct Row<'a> {
     pub heights: &'a [f32],
 }
 
-/// Working memory of one task.
-struct Scratch {
-    /// Columns smoothed downwards, and differenced downwards, with `REACH` border columns a side.
-    smooth: Vec<f32>,
-    difference: Vec<f32>,
-    gx: Vec<f32>,
-    gy: Vec<f32>,
+/// What is made of the gradients. `fill` should be `#[inline(always)]`: it is compiled for several
+/// instruction sets.
+pub(crate) trait Fill: Sync {
+    /// Type of the result.
+    type Sample: Send;
+    /// Samples a texel.
+    const SAMPLES: usize;
+
+    /// Fills the samples of some columns.
+    fn fill(&self, block: &Block<'_>, out: &mut [Self::Sample]);
 }
 
-impl Scratch {
-    fn new(width: usize) -> Self {
-        let padded = vec![0.0; width + 2 * REACH];
-        Self { smooth: padded.clone(), difference: padded, gx: vec![0.0; width], gy: vec![0.0; width] }
-    }
-}
-
-/// Calls `fill(row, out, spare)` for every row of the field; `out` is that row of `target`, `spare`
-/// three rows of scratch floats.
-pub(crate) fn for_each_row<T: Send>(
+/// Fills `target`, which has [`Fill::SAMPLES`] a texel, from the field.
+pub(crate) fn for_each_row<F: Fill>(
     field: &HeightField,
     kernel: Kernel,
-    target: &mut [T],
+    target: &mut [F::Sample],
     progress: &mut Progress<'_>,
-    fill: impl Fn(&Row<'_>, &mut [T], &mut [Vec<f32>; 3]) + Sync,
+    fill: &F,
 ) -> Result<(), BakeError> {
     let (width, height) = (field.width(), field.height());
-    let stride = target.len() / height;
+    let stride = width * F::SAMPLES;
     let taps = kernel.taps();
     let task_rows = (TASK_TEXELS / width).max(1);
     let batch_rows = (BATCH_TEXELS / width / task_rows).max(1) * task_rows;
     progress.report(0, height)?;
     for (batch, rows) in target.chunks_mut(batch_rows * stride).enumerate() {
         let first = batch * batch_rows;
-        rows.par_chunks_mut(task_rows * stride).enumerate().for_each_init(
-            || (Scratch::new(width), [0, 1, 2].map(|_| vec![0.0_f32; width])),
-            |(scratch, spare), (task, rows)| {
-                for (j, out) in rows.chunks_mut(stride).enumerate() {
-                    let j = first + task * task_rows + j;
-                    gradient(field, &taps, j, scratch);
-                    let row = Row { gx: &scratch.gx, gy: &scratch.gy, heights: texel_row(field, j as i64) };
-                    fill(&row, out, spare);
-                }
-            },
-        );
+        rows.par_chunks_mut(task_rows * stride).enumerate().for_each(|(task, rows)| {
+            for (j, out) in rows.chunks_mut(stride).enumerate() {
+                let j = (first + task * task_rows + j) as i64;
+                let rows = [-2, -1, 0, 1, 2].map(|k| texel_row(field, j + k));
+                fill_row(rows, field.wrap(), &taps, fill, out);
+            }
+        });
         progress.report((first + batch_rows).min(height), height)?;
     }
     Ok(())
@@ -84,56 +82,96 @@ pub(crate) fn texel_row(field: &HeightField, j: i64) -> &[f32] {
     &field.corners()[at..at + field.width()]
 }
 
-fn gradient(field: &HeightField, taps: &Taps, j: usize, scratch: &mut Scratch) {
-    let rows = [-2, -1, 0, 1, 2].map(|k| texel_row(field, j as i64 + k));
-    let inner = REACH..REACH + field.width();
-    smooth(taps, rows, &mut scratch.smooth[inner.clone()]);
-    differ(taps, rows, &mut scratch.difference[inner]);
-    for column in [&mut scratch.smooth, &mut scratch.difference] {
-        pad(field, column);
+/// Fills the samples of one row, with the best instructions there are. All give the same bits:
+/// nothing is fused or reordered.
+pub(crate) fn fill_row<F: Fill>(rows: Rows<'_>, wrap: Wrap, taps: &Taps, fill: &F, out: &mut [F::Sample]) {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2") {
+        #[allow(unsafe_code)]
+        // SAFETY: the instructions are there, as was just asked.
+        unsafe {
+            fill_row_avx2(rows, wrap, taps, fill, out);
+        }
+        return;
     }
-    let shifted = |columns| shifts(columns, field.width());
-    differ(taps, shifted(&scratch.smooth), &mut scratch.gx);
-    smooth(taps, shifted(&scratch.difference), &mut scratch.gy);
+    fill_row_here(rows, wrap, taps, fill, out);
 }
 
-/// Fills the border columns from inside the row. What runs down a column is the same for a column
-/// and for its wrapped image, so no texel is read again.
-fn pad(field: &HeightField, columns: &mut [f32]) {
-    let width = field.width();
-    for k in 1..=REACH as i64 {
-        let left = field.wrap().index(-k, width);
-        let right = field.wrap().index(width as i64 - 1 + k, width);
-        columns[REACH - k as usize] = columns[REACH + left];
-        columns[REACH + width - 1 + k as usize] = columns[REACH + right];
-    }
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn fill_row_avx2<F: Fill>(rows: Rows<'_>, wrap: Wrap, taps: &Taps, fill: &F, out: &mut [F::Sample]) {
+    fill_row_here(rows, wrap, taps, fill, out);
 }
 
-/// The five views of a padded row, shifted by -2 to +2 texels.
-fn shifts(columns: &[f32], width: usize) -> [&[f32]; 5] {
-    [0, 1, 2, 3, 4].map(|k| &columns[k..k + width])
-}
-
-fn differ(taps: &Taps, rows: [&[f32]; 5], out: &mut [f32]) {
+#[inline(always)]
+fn fill_row_here<F: Fill>(rows: Rows<'_>, wrap: Wrap, taps: &Taps, fill: &F, out: &mut [F::Sample]) {
     match taps.radius {
-        0 => differ_by::<0>(rows, taps.derivative, out),
-        1 => differ_by::<1>(rows, taps.derivative, out),
-        _ => differ_by::<2>(rows, taps.derivative, out),
+        0 => fill_row_by::<F, 0>(rows, wrap, taps, fill, out),
+        1 => fill_row_by::<F, 1>(rows, wrap, taps, fill, out),
+        _ => fill_row_by::<F, 2>(rows, wrap, taps, fill, out),
     }
 }
 
-fn smooth(taps: &Taps, rows: [&[f32]; 5], out: &mut [f32]) {
-    match taps.radius {
-        0 => out.copy_from_slice(rows[2]),
-        1 => smooth_by::<1>(rows, taps.centre, taps.smoothing, out),
-        _ => smooth_by::<2>(rows, taps.centre, taps.smoothing, out),
+/// Columns of a block with `REACH` more on either side.
+type Columns = [f32; BLOCK + 2 * REACH];
+
+#[inline(always)]
+fn fill_row_by<F: Fill, const R: usize>(
+    rows: Rows<'_>,
+    wrap: Wrap,
+    taps: &Taps,
+    fill: &F,
+    out: &mut [F::Sample],
+) {
+    let (mut smooth, mut difference): (Columns, Columns) = ([0.0; _], [0.0; _]);
+    let (mut gx, mut gy) = ([0.0_f32; BLOCK], [0.0_f32; BLOCK]);
+    for (block, out) in out.chunks_mut(BLOCK * F::SAMPLES).enumerate() {
+        let (first, n) = (block * BLOCK, out.len() / F::SAMPLES);
+        down::<R>(rows, wrap, taps, first, n, &mut smooth, &mut difference);
+        differ_by::<R>(shifts(&smooth, n), taps, &mut gx[..n]);
+        smooth_by::<R>(shifts(&difference, n), taps, &mut gy[..n]);
+        fill.fill(&Block { gx: &gx[..n], gy: &gy[..n], heights: &rows[REACH][first..first + n] }, out);
     }
+}
+
+/// The vertical pass: columns `first - REACH .. first + n + REACH`, smoothed and differenced downwards.
+#[inline(always)]
+fn down<const R: usize>(
+    rows: Rows<'_>,
+    wrap: Wrap,
+    taps: &Taps,
+    first: usize,
+    n: usize,
+    smooth: &mut Columns,
+    difference: &mut Columns,
+) {
+    let width = rows[REACH].len();
+    let (from, to) = (first.saturating_sub(REACH), (first + n + REACH).min(width));
+    // Column `x` of the map is at `x + REACH - first`.
+    let mut pass = |from: usize, to: usize, at: usize| {
+        let part = rows.map(|row| &row[from..to]);
+        smooth_by::<R>(part, taps, &mut smooth[at..at + to - from]);
+        differ_by::<R>(part, taps, &mut difference[at..at + to - from]);
+    };
+    pass(from, to, from + REACH - first);
+    // What runs down a column is the same for a column and for its wrapped image.
+    let beyond = (first as i64 - REACH as i64..0).chain(width as i64..(first + n + REACH) as i64);
+    for x in beyond {
+        let inside = wrap.index(x, width);
+        pass(inside, inside + 1, (x + REACH as i64 - first as i64) as usize);
+    }
+}
+
+/// The five views of padded columns, shifted by -2 to +2 texels.
+#[inline(always)]
+fn shifts(columns: &Columns, n: usize) -> Rows<'_> {
+    [0, 1, 2, 3, 4].map(|k| &columns[k..k + n])
 }
 
 /// Difference across rows with reach `R`; 0 is the one-sided difference.
-#[inline]
-fn differ_by<const R: usize>(rows: [&[f32]; 5], weights: [f32; 2], out: &mut [f32]) {
-    let n = out.len();
+#[inline(always)]
+fn differ_by<const R: usize>(rows: Rows<'_>, taps: &Taps, out: &mut [f32]) {
+    let (n, weights) = (out.len(), taps.derivative);
     let rows = rows.map(|row| &row[..n]);
     for i in 0..n {
         out[i] = match R {
@@ -145,12 +183,16 @@ fn differ_by<const R: usize>(rows: [&[f32]; 5], weights: [f32; 2], out: &mut [f3
 }
 
 /// Symmetric smoothing across rows with reach `R`.
-#[inline]
-fn smooth_by<const R: usize>(rows: [&[f32]; 5], centre: f32, weights: [f32; 2], out: &mut [f32]) {
-    let n = out.len();
+#[inline(always)]
+fn smooth_by<const R: usize>(rows: Rows<'_>, taps: &Taps, out: &mut [f32]) {
+    let (n, centre, weights) = (out.len(), taps.centre, taps.smoothing);
     let rows = rows.map(|row| &row[..n]);
     for i in 0..n {
         let near = centre * rows[2][i] + weights[0] * (rows[1][i] + rows[3][i]);
-        out[i] = if R == 1 { near } else { near + weights[1] * (rows[0][i] + rows[4][i]) };
+        out[i] = match R {
+            0 => rows[2][i],
+            1 => near,
+            _ => near + weights[1] * (rows[0][i] + rows[4][i]),
+        };
     }
 }

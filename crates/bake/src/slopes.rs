@@ -2,7 +2,7 @@
 
 use heightfield::HeightField;
 
-use crate::rows::for_each_row;
+use crate::rows::{Block, Fill, for_each_row};
 use crate::{BakeError, Kernel, Progress};
 
 /// Slopes `[dh/du, dh/dv]` at the texel centres, height per tile, `u` right and `v` **down**.
@@ -16,12 +16,24 @@ pub fn slopes(
     kernel: Kernel,
     mut progress: Progress<'_>,
 ) -> Result<Vec<[f32; 2]>, BakeError> {
-    let (width, height) = (field.width() as f32, field.height() as f32);
+    let fill = Slopes { size: [field.width() as f32, field.height() as f32] };
     let mut slopes = vec![[0.0; 2]; field.width() * field.height()];
-    for_each_row(field, kernel, &mut slopes, &mut progress, |row, out, _| {
-        for ((slope, gx), gy) in out.iter_mut().zip(row.gx).zip(row.gy) {
-            *slope = [gx * width, gy * height];
-        }
-    })?;
+    for_each_row(field, kernel, &mut slopes, &mut progress, &fill)?;
     Ok(slopes)
+}
+
+struct Slopes {
+    size: [f32; 2],
+}
+
+impl Fill for Slopes {
+    type Sample = [f32; 2];
+    const SAMPLES: usize = 1;
+
+    #[inline(always)]
+    fn fill(&self, block: &Block<'_>, out: &mut [[f32; 2]]) {
+        for ((slope, gx), gy) in out.iter_mut().zip(block.gx).zip(block.gy) {
+            *slope = [gx * self.size[0], gy * self.size[1]];
+        }
+    }
 }

@@ -4,11 +4,14 @@
 mod common;
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use bake::encode::{Range, Rounding, decode};
+use bake::encode::{Depth, Range, Rounding, decode};
 use bake::maps::REGISTRY;
-use bake::{BakeError, Baked, FileFormat, Form, Map, Progress, Samples, bake, read_image, save};
+use bake::{
+    BakeError, Baked, FileFormat, Form, Map, Progress, Samples, bake, bake_encoded, bake_rows, read_image,
+    save,
+};
 use common::{angle, noise};
 use heightfield::{HeightField, Wrap};
 
@@ -28,6 +31,11 @@ fn field() -> HeightField {
 fn baked(field: &HeightField, map: &str) -> Baked {
     let map = Map::named(map).unwrap();
     bake(field, map, &map.info.defaults(), Progress::none()).unwrap()
+}
+
+fn written(baked: &Baked, folder: &Path, stem: &str, format: FileFormat) -> Vec<PathBuf> {
+    let files = save(baked, folder, stem, format, Progress::none()).unwrap();
+    files.into_iter().map(|file| file.path).collect()
 }
 
 /// The texels of all files of a slice as `channels` interleaved floats, as another program reads them.
@@ -67,7 +75,7 @@ fn files_hold_what_was_baked() {
         let ranges = baked.ranges();
         assert_eq!(ranges.len(), map.info.channels.len());
         for (format, step) in FORMATS {
-            let mut paths = save(&baked, folder.path(), "wall", format).unwrap();
+            let mut paths = written(&baked, folder.path(), "wall", format);
             let slices: usize = baked.layers.iter().map(|layer| layer.depth).sum();
             let files = paths.len() / slices;
             for layer in &baked.layers {
@@ -138,7 +146,7 @@ fn constant_maps_bake() {
                 let folder = tempfile::tempdir().unwrap();
                 let baked = baked(&field, map.info.name);
                 assert!(baked.layers.iter().all(|l| l.texels.iter().all(|v| v.is_finite())));
-                save(&baked, folder.path(), "", FileFormat::Png8).unwrap();
+                written(&baked, folder.path(), "", FileFormat::Png8);
             }
         }
     }
@@ -149,7 +157,7 @@ fn flat_maps_are_the_usual_blue() {
     let folder = tempfile::tempdir().unwrap();
     let field = HeightField::new(&[0.25; 12], 4, 3, Wrap::Clamp).unwrap();
     let texel = |map: &str, format| {
-        let path = &save(&baked(&field, map), folder.path(), "", format).unwrap()[0];
+        let path = &written(&baked(&field, map), folder.path(), "", format)[0];
         match read_image(path).unwrap().samples {
             Samples::U8(samples) => samples[..4].iter().map(|&v| u16::from(v)).collect::<Vec<_>>(),
             Samples::U16(samples) => samples[..4].to_vec(),
@@ -167,8 +175,7 @@ fn flat_maps_are_the_usual_blue() {
 fn eight_bits_cost_less_than_half_a_degree() {
     let field = HeightField::new(&vec![0.0; 64 * 64], 64, 64, Wrap::Repeat).unwrap();
     let flat = baked(&field, "normal");
-    let image = &flat.images(0, 0, FileFormat::Png8, &flat.ranges()).unwrap()[0].1;
-    let read = decode(&image.samples, &flat.ranges());
+    let read = decode(&flat.encoded(Depth::U8).layers[0].samples, &flat.ranges());
     let error = angle([read[0], read[1], read[2]].map(f64::from), [0.0, 0.0, 1.0]);
     // No code stands for 0: half a step along x and y.
     assert!((0.31..0.325).contains(&error), "{error}");
@@ -177,6 +184,54 @@ fn eight_bits_cost_less_than_half_a_degree() {
 #[test]
 fn missing_folders_are_an_error() {
     let folder = tempfile::tempdir().unwrap().path().join("missing");
-    let error = save(&baked(&field(), "normal"), &folder, "a", FileFormat::Png8).unwrap_err();
+    let error =
+        save(&baked(&field(), "normal"), &folder, "a", FileFormat::Png8, Progress::none()).unwrap_err();
     assert!(matches!(error, BakeError::Io { action: "write", .. }), "{error}");
+}
+
+#[test]
+fn integers_baked_straight_are_those_of_floats_encoded() {
+    let noisy = |w: usize, h: usize| noise(w * h, 5);
+    for (w, h) in [(1, 1), (1, 9), (513, 3), (600, 5), (1026, 2)] {
+        for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
+            let flat = vec![0.5; w * h];
+            for texels in [noisy(w, h), flat] {
+                let field = HeightField::new(&texels, w, h, wrap).unwrap();
+                for map in REGISTRY {
+                    let options = map.info.defaults();
+                    let floats = bake(&field, map, &options, Progress::none()).unwrap();
+                    for depth in [Depth::U8, Depth::U16] {
+                        let straight = bake_encoded(&field, map, &options, depth, Progress::none()).unwrap();
+                        assert_eq!(straight, floats.encoded(depth), "{} {w}x{h}", map.info.name);
+                    }
+                    let mut again = vec![0.0_f32; floats.layers[0].texels.len()];
+                    let result = bake_rows(&field, map, &options, &mut again, Progress::none());
+                    assert_eq!(result.is_ok(), map.is_by_rows());
+                    assert!(result.is_err() || again == floats.layers[0].texels);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_save_can_be_stopped_and_leaves_whole_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let field = HeightField::new(&noise(512 * 512, 2), 512, 512, Wrap::Repeat).unwrap();
+    for (map, calls_allowed) in [("normal", 2), ("pyramid", 5)] {
+        for format in [FileFormat::Png8, FileFormat::Tiff32, FileFormat::Exr] {
+            let mut calls = 0;
+            let mut stop = |_, _| {
+                calls += 1;
+                calls < calls_allowed
+            };
+            let result = save(&baked(&field, map), folder.path(), "", format, Progress::new(&mut stop));
+            assert!(matches!(result, Err(BakeError::Interrupted)), "{map} {format:?}: {result:?}");
+        }
+    }
+    for entry in fs::read_dir(folder.path()).unwrap() {
+        let path = entry.unwrap().path();
+        assert!(read_image(&path).is_ok(), "{}", path.display());
+        assert!(path.file_name().unwrap().to_string_lossy().starts_with("pyramid"), "{}", path.display());
+    }
 }

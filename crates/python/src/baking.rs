@@ -2,13 +2,15 @@
 
 use std::path::PathBuf;
 
-use bake::encode::Range;
+use bake::encode::{Depth, Range, Sample};
 use bake::maps::REGISTRY;
-use bake::{Baked, FileFormat, Form, Grid, Kind, Layer, Map, MapInfo, Options, Progress, Span, Value};
-use heightfield::Wrap;
-use numpy::{
-    PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods, ndarray::IxDyn,
+use bake::{
+    BakeError, Baked, Encoded, EncodedLayer, FileFormat, Form, Grid, HeightSettings, Kind, Layer, Map,
+    MapInfo, Options, Progress, Samples, Span, StreamRequest, Value, Values, bake_cached, bake_rows,
 };
+use heightfield::{Extent, HeightField, Wrap};
+use numpy::ndarray::IxDyn;
+use numpy::{Element, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -129,74 +131,233 @@ pub fn map_bytes(
     Ok((plan.bytes(map.info.channels.len()), plan.working_bytes))
 }
 
-/// The shape of a layer's array: `(D, H, W, C)` without depth outside stacks and without channels
-/// where there is but one.
-fn shape(info: &MapInfo, layer: &Layer) -> Vec<usize> {
-    let depth = matches!(info.form, Form::Stack { .. }).then_some(layer.depth);
+/// The shape of the array of a `[width, height, depth]` layer: `(D, H, W, C)` without depth outside
+/// stacks and without channels where there is but one.
+fn shape(info: &MapInfo, [width, height, depth]: [usize; 3]) -> Vec<usize> {
+    let depth = matches!(info.form, Form::Stack { .. }).then_some(depth);
     let channels = Some(info.channels.len()).filter(|&channels| channels > 1);
-    depth.into_iter().chain([layer.height, layer.width]).chain(channels).collect()
+    depth.into_iter().chain([height, width]).chain(channels).collect()
 }
 
-/// Bakes one map: its layers as float32 arrays. Only pyramids have more than one.
+/// Layers as arrays, and what the ends of each channel's range are.
+type Made<'py> = (Vec<Bound<'py, PyAny>>, Vec<(f32, f32)>);
+
+/// Bakes one map: its layers as arrays of that type. Only pyramids have more than one. Costly maps
+/// come out of the cache where it has them.
 ///
 /// `progress(done, total)` counts rows from `first` to `first + height` of `total`.
 #[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "one flat call from the Python facade")]
 pub fn bake_map<'py>(
     py: Python<'py>,
     field: &Field,
     map: &str,
     options: Vec<(String, Setting)>,
+    dtype: &str,
     progress: Option<&Bound<'py, PyAny>>,
     first: usize,
     total: usize,
-) -> PyResult<Vec<Bound<'py, PyArrayDyn<f32>>>> {
+) -> PyResult<Made<'py>> {
     let map = Map::named(map).map_err(Raise::raise)?;
     let options = parse_options(&map.info, options)?;
+    let depth = parse_depth(dtype)?;
     let field = field.shared();
-    let baked = run(py, progress, |task| {
-        let rows = field.height();
-        let mut report = |done: usize, of: usize| task.advance(first + done * rows / of.max(1), total);
-        bake::bake(&field, map, &options, Progress::new(&mut report))
-    })?;
-    baked
-        .layers
-        .into_iter()
-        .map(|layer| {
-            let shape = shape(baked.info, &layer);
-            PyArray1::from_vec(py, layer.texels).reshape(IxDyn(&shape))
+    let job = Job { py, field: &field, map, options: &options, progress, first, total };
+    if map.is_by_rows() {
+        let array = match depth {
+            None => job.by_rows::<f32>()?,
+            Some(Depth::U8) => job.by_rows::<u8>()?,
+            Some(Depth::U16) => job.by_rows::<u16>()?,
+        };
+        let ranges = map.info.channels.iter().map(|channel| match channel.span {
+            Span::Fixed(range) => (range.low, range.high),
+            Span::Found(_) => (f32::MIN, f32::MAX),
+        });
+        return Ok((vec![array], ranges.collect()));
+    }
+    let ends = |ranges: &[Range]| ranges.iter().map(|range| (range.low, range.high)).collect();
+    let baked = job.run(|progress| bake_cached(&field, map, &options, progress))?;
+    let Some(depth) = depth else {
+        let ranges = ends(&baked.ranges());
+        let arrays = baked.layers.into_iter().map(|layer| {
+            let shape = shape(&map.info, [layer.width, layer.height, layer.depth]);
+            Ok(PyArray1::from_vec(py, layer.texels).reshape(IxDyn(&shape))?.into_any())
+        });
+        return Ok((arrays.collect::<PyResult<_>>()?, ranges));
+    };
+    let encoded = run(py, None, |_| Ok::<_, BakeError>(baked.encoded(depth)))?;
+    let ranges = ends(&encoded.ranges);
+    let arrays = encoded.layers.into_iter().map(|layer| {
+        let shape = IxDyn(&shape(&map.info, [layer.width, layer.height, layer.depth]));
+        Ok(match layer.samples {
+            Samples::U8(samples) => PyArray1::from_vec(py, samples).reshape(shape)?.into_any(),
+            Samples::U16(samples) => PyArray1::from_vec(py, samples).reshape(shape)?.into_any(),
+            Samples::F32(samples) => PyArray1::from_vec(py, samples).reshape(shape)?.into_any(),
         })
-        .collect()
+    });
+    Ok((arrays.collect::<PyResult<_>>()?, ranges))
 }
 
-/// Writes the layers of a map into a folder and returns the files made.
+/// One map to be baked, with where its progress goes.
+struct Job<'a, 'py> {
+    py: Python<'py>,
+    field: &'a HeightField,
+    map: &'static Map,
+    options: &'a Options,
+    progress: Option<&'a Bound<'py, PyAny>>,
+    first: usize,
+    total: usize,
+}
+
+impl<'py> Job<'_, 'py> {
+    fn run<T: Send>(&self, work: impl FnOnce(Progress<'_>) -> Result<T, BakeError> + Send) -> PyResult<T> {
+        let (rows, first, total) = (self.field.height(), self.first, self.total);
+        run(self.py, self.progress, |task| {
+            let mut report = |done: usize, of: usize| task.advance(first + done * rows / of.max(1), total);
+            work(Progress::new(&mut report))
+        })
+    }
+
+    /// Bakes straight into an array of NumPy's, whose large arrays take the system fewest steps.
+    fn by_rows<S: Sample + Element>(&self) -> PyResult<Bound<'py, PyAny>> {
+        let Self { field, map, options, .. } = *self;
+        bake::maps::check_memory(map, Grid::of(field), options, size_of::<S>()).map_err(Raise::raise)?;
+        let shape = shape(&map.info, [field.width(), field.height(), 1]);
+        let array = PyArrayDyn::<S>::zeros(self.py, IxDyn(&shape), false);
+        {
+            let mut view = array.readwrite();
+            let out = view.as_slice_mut()?;
+            self.run(|progress| bake_rows(field, map, options, out, progress))?;
+        }
+        Ok(array.into_any())
+    }
+}
+
+fn parse_depth(dtype: &str) -> PyResult<Option<Depth>> {
+    match dtype {
+        "float32" => Ok(None),
+        "uint8" => Ok(Some(Depth::U8)),
+        "uint16" => Ok(Some(Depth::U16)),
+        _ => Err(PyValueError::new_err(format!("dtype must be float32, uint8 or uint16, got {dtype:?}"))),
+    }
+}
+
+/// A layer as Python has it.
+#[derive(FromPyObject)]
+pub enum LayerArray<'py> {
+    /// Floats.
+    F32(PyReadonlyArrayDyn<'py, f32>),
+    /// 8-bit integers.
+    U8(PyReadonlyArrayDyn<'py, u8>),
+    /// 16-bit integers.
+    U16(PyReadonlyArrayDyn<'py, u16>),
+}
+
+impl LayerArray<'_> {
+    fn layer(&self, info: &MapInfo) -> PyResult<EncodedLayer> {
+        let (found, samples) = match self {
+            Self::F32(array) => (array.shape(), Samples::F32(array.as_slice()?.to_vec())),
+            Self::U8(array) => (array.shape(), Samples::U8(array.as_slice()?.to_vec())),
+            Self::U16(array) => (array.shape(), Samples::U16(array.as_slice()?.to_vec())),
+        };
+        let stack = usize::from(matches!(info.form, Form::Stack { .. }));
+        let depth = if stack == 1 { found.first().copied().unwrap_or(0) } else { 1 };
+        let (height, width) = match found.get(stack..) {
+            Some(&[height, width, ..]) => (height, width),
+            _ => (0, 0),
+        };
+        if found != shape(info, [width, height, depth]).as_slice() || found.contains(&0) {
+            return Err(PyValueError::new_err(format!("map {:?} cannot have shape {found:?}", info.name)));
+        }
+        Ok(EncodedLayer { width, height, depth, samples })
+    }
+}
+
+/// File, index of the layer, index of the slice, name of the only channel.
+type File = (PathBuf, usize, usize, Option<&'static str>);
+
+/// Files, and the ends of each channel's range.
+type Saved = (Vec<File>, Vec<(f32, f32)>);
+
+/// Writes the layers of a map into a folder; returns the files made and the ends of each channel's
+/// range. `ranges` are those of integers.
 #[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "one flat call from the Python facade")]
 pub fn save_map(
     py: Python<'_>,
     map: &str,
-    layers: Vec<PyReadonlyArrayDyn<'_, f32>>,
+    layers: Vec<LayerArray<'_>>,
+    ranges: Vec<(f32, f32)>,
     folder: PathBuf,
     prefix: &str,
     format: &str,
     bits: u8,
-) -> PyResult<Vec<PathBuf>> {
+) -> PyResult<Saved> {
     let info = bake::maps::about(map).map_err(Raise::raise)?;
     let format = FileFormat::named(format, bits).map_err(Raise::raise)?;
-    let layers = layers.iter().map(|array| layer(info, array)).collect::<PyResult<_>>()?;
-    let baked = Baked { info, options: info.defaults(), layers };
-    run(py, None, |_| bake::save(&baked, &folder, prefix, format))
+    let layers = layers.iter().map(|array| array.layer(info)).collect::<PyResult<Vec<_>>>()?;
+    let (files, ranges) = run(py, None, |task| {
+        let mut report = |done, total| task.advance(done, total);
+        let progress = Progress::new(&mut report);
+        if layers.iter().all(|layer| matches!(layer.samples, Samples::F32(_))) {
+            let layers = layers.into_iter().map(|EncodedLayer { width, height, depth, samples }| {
+                let texels = if let Samples::F32(texels) = samples { texels } else { Vec::new() };
+                Layer { width, height, depth, texels }
+            });
+            let baked = Baked { info, options: info.defaults(), layers: layers.collect() };
+            return Ok::<_, BakeError>((
+                bake::save(&baked, &folder, prefix, format, progress)?,
+                baked.ranges(),
+            ));
+        }
+        let ranges = info.channels.iter().zip(&ranges).map(|(channel, &(low, high))| {
+            let (Span::Fixed(Range { rounding, .. }) | Span::Found(rounding)) = channel.span;
+            Range { low, high, rounding }
+        });
+        let encoded = Encoded { info, options: info.defaults(), ranges: ranges.collect(), layers };
+        Ok((bake::save(&encoded, &folder, prefix, format, progress)?, encoded.ranges))
+    })?;
+    let files = files.into_iter().map(|file| (file.path, file.layer, file.slice, file.channel));
+    Ok((files.collect(), ranges.iter().map(|range| (range.low, range.high)).collect()))
 }
 
-fn layer(info: &MapInfo, array: &PyReadonlyArrayDyn<'_, f32>) -> PyResult<Layer> {
-    let found = array.shape();
-    let depth = if matches!(info.form, Form::Stack { .. }) { found.first().copied() } else { Some(1) };
-    let at = found.len().min(usize::from(matches!(info.form, Form::Stack { .. })));
-    let (depth, height, width) = match (depth, &found[at..]) {
-        (Some(depth), &[height, width, ..]) => (depth, height, width),
-        _ => (0, 0, 0),
+/// What becomes of the numbers of a file: channel, "natural", "auto" or two numbers, inverted.
+type Reading = (Option<usize>, Option<(f64, f64)>, bool, bool);
+
+/// Bakes a map of a file into a file by rows; returns width, height, heights clipped and range.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "one flat call from the Python facade")]
+pub fn bake_file(
+    py: Python<'_>,
+    source: PathBuf,
+    target: PathBuf,
+    map: &str,
+    options: Vec<(String, Setting)>,
+    dtype: &str,
+    wrap: &str,
+    extent: (f32, f32, [f32; 2]),
+    reading: Reading,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<(usize, usize, usize, [f64; 2])> {
+    let map = Map::named(map).map_err(Raise::raise)?;
+    let options = parse_options(&map.info, options)?;
+    let depth = parse_depth(dtype)?;
+    let (channel, span, auto, invert) = reading;
+    let values = match span {
+        Some((low, high)) => Values::Span([low, high]),
+        None if auto => Values::Auto,
+        None => Values::Natural,
     };
-    let layer = Layer { width, height, depth, texels: Vec::new() };
-    if found != shape(info, &layer).as_slice() || found.contains(&0) {
-        return Err(PyValueError::new_err(format!("map {:?} cannot have shape {found:?}", info.name)));
-    }
-    Ok(Layer { texels: array.as_slice()?.to_vec(), ..layer })
+    let request = StreamRequest {
+        map,
+        options: &options,
+        wrap: parse_wrap(wrap)?,
+        extent: Extent { scale: extent.0, base: extent.1, tile_size: extent.2 },
+        settings: HeightSettings { channel, values, invert },
+    };
+    let found = run(py, progress, |task| {
+        let mut report = |done, total| task.advance(done, total);
+        bake::bake_file(&source, &target, depth, &request, Progress::new(&mut report))
+    })?;
+    Ok((found.width, found.height, found.clipped, found.range))
 }

@@ -78,7 +78,11 @@ impl Raise for BakeError {
                 io(source.kind(), message.clone()).unwrap_or_else(|| PyBakeError::new_err(message))
             }
             Self::HeightField(error) => error.raise(),
-            Self::UnknownName { .. } | Self::Shape { .. } | Self::Option { .. } => {
+            // What is wrong with the values of a file is the caller's to say otherwise.
+            Self::File { ref source, .. } if matches!(**source, Self::Stream { .. }) => {
+                PyValueError::new_err(message)
+            }
+            Self::UnknownName { .. } | Self::Shape { .. } | Self::Option { .. } | Self::Stream { .. } => {
                 PyValueError::new_err(message)
             }
             _ => PyBakeError::new_err(message),

@@ -23,7 +23,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _bumpwgpu {
     #[pymodule_export]
-    use crate::baking::{bake_map, map_bytes, map_registry, save_map};
+    use crate::baking::{bake_file, bake_map, map_bytes, map_registry, save_map};
     #[pymodule_export]
     use crate::compare::{CompareView, SegmentReference, compare_front, compare_planar, compare_recommend};
     #[pymodule_export]

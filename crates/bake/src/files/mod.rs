@@ -18,6 +18,7 @@ mod exr;
 mod guard;
 mod marks;
 mod raster;
+pub(crate) mod replace;
 mod tiff;
 mod write;
 
@@ -27,7 +28,7 @@ use std::path::Path;
 use ::image::ImageFormat;
 
 use crate::{BakeError, Image};
-pub use write::{WriteOptions, write_image, write_image_with};
+pub use write::{WriteOptions, write_image, write_image_unless_stopped, write_image_with};
 
 /// First bytes of an EXR file.
 const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];

@@ -1,7 +1,6 @@
 //! Writing image files: under a temporary name in the same folder, renamed when complete.
 
-use std::fs::File;
-use std::io::{BufWriter, Seek, Write};
+use std::io::{Seek, Write};
 use std::path::Path;
 
 use ::exr::prelude::{
@@ -14,7 +13,8 @@ use ::tiff::encoder::{Compression, DeflateLevel, Predictor, TiffEncoder, TiffVal
 use ::tiff::tags::ExtraSamples;
 use half::f16;
 
-use crate::{BakeError, Image, Samples};
+use super::replace::replace;
+use crate::{BakeError, Image, Progress, Samples};
 
 /// How to store an image where a format leaves a choice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -41,6 +41,19 @@ pub fn write_image(path: &Path, image: &Image) -> Result<(), BakeError> {
 /// # Errors
 /// See [`write_image`]; also [`BakeError::Unwritable`] when an option does not apply.
 pub fn write_image_with(path: &Path, image: &Image, options: WriteOptions) -> Result<(), BakeError> {
+    write_image_unless_stopped(path, image, options, &mut Progress::none())
+}
+
+/// [`write_image_with`] that asks `progress` now and then whether to go on; it reports nothing.
+///
+/// # Errors
+/// See [`write_image_with`]; also [`BakeError::Interrupted`], after which there is no new file.
+pub fn write_image_unless_stopped(
+    path: &Path,
+    image: &Image,
+    options: WriteOptions,
+    progress: &mut Progress<'_>,
+) -> Result<(), BakeError> {
     image.validate()?;
     let suffix =
         path.extension().map(|suffix| suffix.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
@@ -56,27 +69,11 @@ pub fn write_image_with(path: &Path, image: &Image, options: WriteOptions) -> Re
     if options.half && format != Format::Exr {
         return Err(unwritable(image, &suffix, "half floats exist in EXR only"));
     }
-    let io = |source| BakeError::Io { action: "write", path: path.to_owned(), source };
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    if path.is_dir() {
-        return Err(io(std::io::Error::new(std::io::ErrorKind::IsADirectory, "it is a folder")));
-    }
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".bake-").suffix(".part");
-    // A temporary file is private by default; the result is to have the usual rights.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let file = builder.tempfile_in(folder).map_err(io)?;
-    let mut writer = BufWriter::new(file.as_file());
-    match format {
-        Format::Png => write_png(&mut writer, image)?,
-        Format::Tiff => write_tiff(&mut writer, image)?,
-        Format::Exr => write_exr(&mut writer, image, options)?,
-    }
-    writer.flush().map_err(io)?;
-    drop(writer);
-    file.persist(path).map_err(|error| io(error.error))?;
-    Ok(())
+    replace(path, progress, |writer| match format {
+        Format::Png => write_png(writer, image),
+        Format::Tiff => write_tiff(writer, image),
+        Format::Exr => write_exr(writer, image, options),
+    })
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -86,7 +83,7 @@ enum Format {
     Exr,
 }
 
-fn write_png(writer: &mut BufWriter<&File>, image: &Image) -> Result<(), BakeError> {
+fn write_png(writer: &mut impl Write, image: &Image) -> Result<(), BakeError> {
     use ExtendedColorType as Color;
     let (bytes, colors): (&[u8], _) = match &image.samples {
         Samples::U8(samples) => (samples, [Color::L8, Color::La8, Color::Rgb8, Color::Rgba8]),
@@ -106,7 +103,7 @@ fn write_png(writer: &mut BufWriter<&File>, image: &Image) -> Result<(), BakeErr
         .map_err(|error| unwritable(image, "PNG", &error.to_string()))
 }
 
-fn write_tiff(writer: &mut BufWriter<&File>, image: &Image) -> Result<(), BakeError> {
+fn write_tiff(writer: &mut (impl Write + Seek), image: &Image) -> Result<(), BakeError> {
     match &image.samples {
         Samples::U8(samples) => match image.channels {
             1 | 2 => tiff_as::<colortype::Gray8>(writer, image, samples),
@@ -124,7 +121,7 @@ fn write_tiff(writer: &mut BufWriter<&File>, image: &Image) -> Result<(), BakeEr
 }
 
 fn tiff_as<C: ColorType>(
-    writer: &mut BufWriter<&File>,
+    writer: &mut (impl Write + Seek),
     image: &Image,
     samples: &[C::Inner],
 ) -> Result<(), BakeError>

@@ -4,6 +4,7 @@
 //! [`REGISTRY`]. Python's `bake`, the command line, the docs and the tests that walk all maps follow
 //! from that. Maps that come from elsewhere (a detailed mesh) have a [`MapInfo`] only.
 
+mod encoded;
 mod from_mesh;
 mod options;
 mod plan;
@@ -17,10 +18,11 @@ use crate::{
     relief,
 };
 
+pub use encoded::{Encoded, EncodedLayer, bake_encoded, bake_rows};
 pub use from_mesh::{FROM_MESH, HEIGHT, TANGENTS, about};
 pub use options::{Kind, MapOption, Options, Value};
 pub use plan::{Grid, Plan};
-pub use store::{FileFormat, save};
+pub use store::{FileFormat, Storable, Stored, save};
 
 /// All maps that are made from heights, in the order users see them.
 pub static REGISTRY: &[&Map] = &[
@@ -111,6 +113,17 @@ impl MapInfo {
     pub fn defaults(&self) -> Options {
         Options::defaults(self.name, self.options)
     }
+
+    /// The ranges of the channels, the whole of the floats where the data decides.
+    pub(crate) fn fixed_ranges(&self) -> Vec<Range> {
+        self.channels
+            .iter()
+            .map(|channel| match channel.span {
+                Span::Fixed(range) => range,
+                Span::Found(rounding) => Range { low: f32::MIN, high: f32::MAX, rounding },
+            })
+            .collect()
+    }
 }
 
 /// A map that is made from heights.
@@ -185,6 +198,14 @@ impl Baked {
         };
         self.info.channels.iter().enumerate().map(of).collect()
     }
+}
+
+/// Makes sure that the machine can hold a map, with that many bytes a sample, and what its bake needs.
+///
+/// # Errors
+/// [`BakeError::Memory`].
+pub fn check_memory(map: &Map, grid: Grid, options: &Options, sample_bytes: usize) -> Result<(), BakeError> {
+    (map.plan)(grid, options).check_samples(&map.info, sample_bytes)
 }
 
 /// Bakes a map.

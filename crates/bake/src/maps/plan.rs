@@ -83,19 +83,32 @@ impl Plan {
         texels * channels as u128 * size_of::<f32>() as u128
     }
 
-    /// Makes sure that the machine can hold it.
+    /// Makes sure that the machine can hold it as floats.
     ///
     /// # Errors
     /// [`BakeError::Memory`].
     pub fn check(&self, info: &MapInfo) -> Result<(), BakeError> {
-        self.check_against(info, available_memory())
+        self.check_samples(info, size_of::<f32>())
     }
 
-    fn check_against(&self, info: &MapInfo, available: Option<u64>) -> Result<(), BakeError> {
-        let needed = self.bytes(info.channels.len()) + self.working_bytes;
+    /// Makes sure that the machine can hold it with that many bytes a sample.
+    ///
+    /// # Errors
+    /// [`BakeError::Memory`].
+    pub(crate) fn check_samples(&self, info: &MapInfo, bytes: usize) -> Result<(), BakeError> {
+        let needed = self.bytes(info.channels.len()) / size_of::<f32>() as u128 * bytes as u128;
+        Self::fits(needed + self.working_bytes, &self.layers, info, available_memory())
+    }
+
+    fn fits(
+        needed: u128,
+        layers: &[[usize; 3]],
+        info: &MapInfo,
+        available: Option<u64>,
+    ) -> Result<(), BakeError> {
         let available = available.map_or(u128::from(u64::MAX) / 2, u128::from);
         if needed > SMALL && needed > available {
-            let [width, height, depth] = self.layers.first().copied().unwrap_or_default();
+            let [width, height, depth] = layers.first().copied().unwrap_or_default();
             let slices = if depth > 1 { format!(" x {depth}") } else { String::new() };
             return Err(BakeError::Memory {
                 what: format!("map {:?} of {width} x {height}{slices} texels", info.name),
@@ -125,12 +138,15 @@ mod tests {
         let grid = Grid { width: 40_000, height: 40_000, wrap: Wrap::Repeat };
         let plan = Plan::stack(grid, 10).working(1000);
         let info = &crate::normal::NORMAL.info;
-        let error = plan.check_against(info, Some(1 << 30)).unwrap_err().to_string();
+        let check = |plan: &Plan, available| {
+            Plan::fits(plan.bytes(3) + plan.working_bytes, &plan.layers, info, available)
+        };
+        let error = check(&plan, Some(1 << 30)).unwrap_err().to_string();
         assert!(error.contains("needs 192000001000 bytes"), "{error}");
         assert!(error.contains("40000 x 40000 x 10") && error.contains("1073741824"), "{error}");
-        assert!(plan.check_against(info, Some(1 << 40)).is_ok());
-        assert!(plan.check_against(info, None).is_ok());
+        assert!(check(&plan, Some(1 << 40)).is_ok());
+        assert!(check(&plan, None).is_ok());
         let small = Grid { width: 64, height: 64, wrap: Wrap::Repeat };
-        assert!(Plan::single(small).check_against(info, Some(10)).is_ok(), "small ones always start");
+        assert!(check(&Plan::single(small), Some(10)).is_ok(), "small ones always start");
     }
 }

@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Baked, Form, Layer};
+use super::{Baked, Encoded, Form, MapInfo};
 use crate::encode::{Depth, Range, encode};
-use crate::{BakeError, Image, Samples, write_image};
+use crate::files::{WriteOptions, write_image_unless_stopped};
+use crate::{BakeError, Image, Progress, Samples};
 
 /// How a map is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -71,25 +72,78 @@ impl FileFormat {
     }
 }
 
-/// The samples of one slice of a layer, interleaved, as the format stores them.
-fn samples(layer: &Layer, slice: usize, ranges: &[Range], format: FileFormat) -> Samples {
-    let length = layer.texels.len() / layer.depth;
-    let texels = &layer.texels[slice * length..][..length];
-    match format.depth() {
-        None => Samples::F32(texels.to_vec()),
-        Some(depth) => encode(texels, ranges, depth),
+/// A baked map that can be stored.
+pub trait Storable {
+    /// What it is.
+    fn info(&self) -> &'static MapInfo;
+
+    /// What integers stand for in each channel.
+    fn ranges(&self) -> Vec<Range>;
+
+    /// Texels across and down, and slices, of each layer.
+    fn shapes(&self) -> Vec<[usize; 3]>;
+
+    /// The interleaved samples of one slice, as integers of that depth, or as floats for `None`.
+    fn samples(&self, layer: usize, slice: usize, depth: Option<Depth>, ranges: &[Range]) -> Samples;
+}
+
+fn part<T>(texels: &[T], depth: usize, slice: usize) -> &[T] {
+    let length = texels.len() / depth.max(1);
+    texels.get(slice * length..(slice + 1) * length).unwrap_or_default()
+}
+
+impl Storable for Baked {
+    fn info(&self) -> &'static MapInfo {
+        self.info
+    }
+
+    fn ranges(&self) -> Vec<Range> {
+        self.ranges()
+    }
+
+    fn shapes(&self) -> Vec<[usize; 3]> {
+        self.layers.iter().map(|layer| [layer.width, layer.height, layer.depth]).collect()
+    }
+
+    fn samples(&self, layer: usize, slice: usize, depth: Option<Depth>, ranges: &[Range]) -> Samples {
+        let texels = part(&self.layers[layer].texels, self.layers[layer].depth, slice);
+        depth.map_or_else(|| Samples::F32(texels.to_vec()), |depth| encode(texels, ranges, depth))
+    }
+}
+
+/// Integers are stored as they are; the depth asked for has to be theirs.
+impl Storable for Encoded {
+    fn info(&self) -> &'static MapInfo {
+        self.info
+    }
+
+    fn ranges(&self) -> Vec<Range> {
+        self.ranges.clone()
+    }
+
+    fn shapes(&self) -> Vec<[usize; 3]> {
+        self.layers.iter().map(|layer| [layer.width, layer.height, layer.depth]).collect()
+    }
+
+    fn samples(&self, layer: usize, slice: usize, _: Option<Depth>, _: &[Range]) -> Samples {
+        let depth = self.layers[layer].depth;
+        match &self.layers[layer].samples {
+            Samples::U8(samples) => Samples::U8(part(samples, depth, slice).to_vec()),
+            Samples::U16(samples) => Samples::U16(part(samples, depth, slice).to_vec()),
+            Samples::F32(samples) => Samples::F32(part(samples, depth, slice).to_vec()),
+        }
     }
 }
 
 /// Texels of two channels with a third of 0: PNG and TIFF have no colour of two channels.
-fn with_blue(samples: Samples) -> Samples {
+fn with_blue(samples: &Samples) -> Samples {
     fn widen<T: Copy + Default>(samples: &[T]) -> Vec<T> {
         samples.chunks_exact(2).flat_map(|t| [t[0], t[1], T::default()]).collect()
     }
     match samples {
-        Samples::U8(samples) => Samples::U8(widen(&samples)),
-        Samples::U16(samples) => Samples::U16(widen(&samples)),
-        Samples::F32(samples) => Samples::F32(widen(&samples)),
+        Samples::U8(samples) => Samples::U8(widen(samples)),
+        Samples::U16(samples) => Samples::U16(widen(samples)),
+        Samples::F32(samples) => Samples::F32(widen(samples)),
     }
 }
 
@@ -104,81 +158,82 @@ fn channel_of(samples: &Samples, channel: usize, channels: usize) -> Samples {
     }
 }
 
-/// Names of a texel's samples inside a file.
-fn names(baked: &Baked, channels: usize) -> Vec<String> {
-    let own = || baked.info.channels.iter().map(|channel| channel.name.to_owned()).collect();
-    match channels {
-        1 => vec!["Y".to_owned()],
-        2..=4 => ["R", "G", "B", "A"][..channels].iter().map(|&name| name.to_owned()).collect(),
-        _ => own(),
+/// The image files that hold a slice, by the name of their channel: mostly one, without a name.
+fn images(
+    info: &'static MapInfo,
+    [width, height, _]: [usize; 3],
+    samples: Samples,
+    format: FileFormat,
+) -> Result<Vec<(&'static str, Image)>, BakeError> {
+    let channels = info.channels.len();
+    let named = |names: &[&str], samples| {
+        Image::named(width, height, names.iter().map(|&name| name.to_owned()).collect(), samples)
+    };
+    if channels > format.channels() {
+        let each = info.channels.iter().enumerate();
+        return each
+            .map(|(at, channel)| Ok((channel.name, named(&["Y"], channel_of(&samples, at, channels))?)))
+            .collect();
     }
+    let image = match channels {
+        1 => named(&["Y"], samples)?,
+        2 if format != FileFormat::Exr => named(&["R", "G", "B"], with_blue(&samples))?,
+        2..=4 => named(&["R", "G", "B", "A"][..channels], samples)?,
+        _ => named(&info.channels.iter().map(|channel| channel.name).collect::<Vec<_>>(), samples)?,
+    };
+    Ok(vec![("", image)])
 }
 
-impl Baked {
-    /// A slice of a layer as the image files that hold it: mostly one, with an empty name; one for
-    /// each channel, under its name, where the format has fewer channels than the map.
-    ///
-    /// PNG and TIFF have no two-channel colour, so maps of two channels get a blue channel of 0
-    /// there; EXR stores them as R and G. `ranges` are those of [`Baked::ranges`].
-    ///
-    /// # Errors
-    /// [`BakeError::Shape`] for a layer that has not the size it claims, or that does not exist.
-    pub fn images(
-        &self,
-        layer: usize,
-        slice: usize,
-        format: FileFormat,
-        ranges: &[Range],
-    ) -> Result<Vec<(&'static str, Image)>, BakeError> {
-        let channels = self.info.channels.len();
-        let Some(layer) = self.layers.get(layer).filter(|layer| slice < layer.depth) else {
-            return Err(BakeError::Shape { width: 0, height: 0, channels, got: 0 });
-        };
-        let samples = samples(layer, slice, ranges, format);
-        let image = |names, samples| Image::named(layer.width, layer.height, names, samples);
-        if channels > format.channels() {
-            let each = self.info.channels.iter().enumerate();
-            return each
-                .map(|(at, channel)| {
-                    let samples = channel_of(&samples, at, channels);
-                    Ok((channel.name, image(names(self, 1), samples)?))
-                })
-                .collect();
-        }
-        if channels == 2 && format != FileFormat::Exr {
-            return Ok(vec![("", image(names(self, 3), with_blue(samples))?)]);
-        }
-        Ok(vec![("", image(names(self, channels), samples)?)])
-    }
+/// A file that holds a slice of a map, or one channel of it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Stored {
+    /// The file.
+    pub path: PathBuf,
+    /// Index of its layer.
+    pub layer: usize,
+    /// Index of its slice.
+    pub slice: usize,
+    /// Name of its only channel, or `None` when it has all of them.
+    pub channel: Option<&'static str>,
 }
 
-/// Writes a baked map into a folder and returns the files made.
+/// Writes a map into a folder and returns the files made.
 ///
 /// A map is `<stem>_<map>.png` (or `.tiff`, `.exr`); the levels of a pyramid and the slices of a
 /// stack are `<stem>_<map>_00.png` and so on; the channels of a map that has more of them than the
-/// format are `<stem>_<map>_<channel>.png`. An empty `stem` drops the first underscore. Integers
-/// follow [`Baked::ranges`], so lower bounds are rounded down and upper ones up.
+/// format are `<stem>_<map>_<channel>.png`. An empty `stem` drops the first underscore. Maps of two
+/// channels have a blue channel of 0 in PNG and TIFF. Integers follow [`Storable::ranges`], so lower
+/// bounds are rounded down and upper ones up.
 ///
 /// # Errors
-/// See [`write_image`].
-pub fn save(baked: &Baked, folder: &Path, stem: &str, format: FileFormat) -> Result<Vec<PathBuf>, BakeError> {
+/// See [`write_image`](crate::write_image); [`BakeError::Interrupted`], with whole files only.
+pub fn save(
+    map: &impl Storable,
+    folder: &Path,
+    stem: &str,
+    format: FileFormat,
+    mut progress: Progress<'_>,
+) -> Result<Vec<Stored>, BakeError> {
     let separator = if stem.is_empty() { "" } else { "_" };
-    let (name, ranges) = (baked.info.name, baked.ranges());
-    let mut paths = Vec::new();
-    let slices: usize = baked.layers.iter().map(|layer| layer.depth).sum();
+    let (info, ranges, shapes) = (map.info(), map.ranges(), map.shapes());
+    let name = info.name;
+    let slices: usize = shapes.iter().map(|shape| shape[2]).sum();
     let digits = slices.saturating_sub(1).to_string().len().max(2);
-    let parts =
-        baked.layers.iter().enumerate().flat_map(|(at, layer)| (0..layer.depth).map(move |k| (at, k)));
+    let mut files = Vec::new();
+    let parts = shapes.iter().enumerate().flat_map(|(layer, shape)| (0..shape[2]).map(move |k| (layer, k)));
     for (number, (layer, slice)) in parts.enumerate() {
-        let number =
-            if baked.info.form == Form::Single { String::new() } else { format!("_{number:0digits$}") };
-        for (channel, image) in baked.images(layer, slice, format, &ranges)? {
-            let channel = if channel.is_empty() { String::new() } else { format!("_{channel}") };
-            let file = format!("{stem}{separator}{name}{number}{channel}.{}", format.suffix());
-            let path = folder.join(file);
-            write_image(&path, &image)?;
-            paths.push(path);
+        progress.report(number, slices)?;
+        let number = if info.form == Form::Single { String::new() } else { format!("_{number:0digits$}") };
+        let samples = map.samples(layer, slice, format.depth(), &ranges);
+        for (channel, image) in images(info, shapes[layer], samples, format)? {
+            let suffix = format.suffix();
+            let end = if channel.is_empty() { String::new() } else { format!("_{channel}") };
+            let path = folder.join(format!("{stem}{separator}{name}{number}{end}.{suffix}"));
+            write_image_unless_stopped(&path, &image, WriteOptions::default(), &mut progress)?;
+            let channel = (!channel.is_empty()).then_some(channel);
+            files.push(Stored { path, layer, slice, channel });
         }
     }
-    Ok(paths)
+    progress.report(slices, slices)?;
+    Ok(files)
 }
