@@ -217,7 +217,7 @@ def test_command_line(bumpy: bw.Mesh, tmp_path: Path) -> None:
     assert run.exit_code == 0, run.output
     found = json.loads(run.stdout)
     assert (found["width"], found["height"], found["report"]["missed"]) == (32, 16, 0)
-    assert sorted(path.name for path in out.iterdir()) == ["height.png", "normal.png"]
+    assert sorted(path.name for path in out.glob("*.png")) == ["height.png", "normal.png"]
     wrong = CliRunner().invoke(app, ["bake", str(out / "height.png"), "--front", "0.2"])
     assert wrong.exit_code == 2
     assert "need a mesh" in wrong.output.replace("\n", " ")

@@ -189,7 +189,8 @@ def test_shadows_from_a_horizon_map() -> None:
     assert not hard.any()
     # Techniques without a search get shadows too; those without a relief say that they do not.
     bump = render("bump", material=bricks(), lights=low_sun, shadows="horizon", aovs=("shadow",))
-    assert bump.warnings == () and bump.aovs["shadow"].max() == 1
+    assert bump.warnings == ()
+    assert bump.aovs["shadow"].max() == 1
     with pytest.warns(bw.BumpWarning, match="horizon"):
         render("flat", material=bricks(), shadows="horizon")
 

@@ -86,14 +86,31 @@ pub(crate) fn texel_row(field: &HeightField, j: i64) -> &[f32] {
 /// nothing is fused or reordered.
 pub(crate) fn fill_row<F: Fill>(rows: Rows<'_>, wrap: Wrap, taps: &Taps, fill: &F, out: &mut [F::Sample]) {
     #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") {
-        #[allow(unsafe_code)]
-        // SAFETY: the instructions are there, as was just asked.
-        unsafe {
-            fill_row_avx2(rows, wrap, taps, fill, out);
+    {
+        use std::arch::is_x86_feature_detected as has;
+        if has!("avx512f") && has!("avx512bw") && has!("avx512dq") && has!("avx512vl") && has!("avx512vbmi") {
+            #[allow(unsafe_code)]
+            // SAFETY: the processor has the instructions, asked on the line above.
+            unsafe {
+                fill_row_avx512(rows, wrap, taps, fill, out);
+            }
+            return;
         }
-        return;
+        if has!("avx2") {
+            #[allow(unsafe_code)]
+            // SAFETY: the processor has the instructions, asked on the line above.
+            unsafe {
+                fill_row_avx2(rows, wrap, taps, fill, out);
+            }
+            return;
+        }
     }
+    fill_row_here(rows, wrap, taps, fill, out);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx512vbmi")]
+fn fill_row_avx512<F: Fill>(rows: Rows<'_>, wrap: Wrap, taps: &Taps, fill: &F, out: &mut [F::Sample]) {
     fill_row_here(rows, wrap, taps, fill, out);
 }
 
@@ -194,5 +211,53 @@ fn smooth_by<const R: usize>(rows: Rows<'_>, taps: &Taps, out: &mut [f32]) {
             1 => near,
             _ => near + weights[1] * (rows[0][i] + rows[4][i]),
         };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Convention;
+    use crate::normal::{Factors, Normals};
+    use heightfield::Extent;
+
+    #[test]
+    fn all_instructions_give_the_same_bits() {
+        let width = 2 * BLOCK + 37;
+        let mut state = 1_u32;
+        let mut row = || -> Vec<f32> {
+            (0..width)
+                .map(|_| {
+                    state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                    (state >> 8) as f32 / 16_777_216.0
+                })
+                .collect()
+        };
+        let rows = [row(), row(), row(), row(), row()];
+        let rows: Rows<'_> = [0, 1, 2, 3, 4].map(|k| rows[k].as_slice());
+        let extent = Extent { scale: 0.01, ..Extent::default() };
+        let factors = Factors::new([width, width], &extent, Convention::OpenGl);
+        for kernel in Kernel::ALL {
+            let taps = kernel.taps();
+            let bytes = Normals::<u8, 3>::new(factors);
+            let (mut plain, mut best) = (vec![0; 3 * width], vec![0; 3 * width]);
+            fill_row_here(rows, Wrap::Mirror, &taps, &bytes, &mut plain);
+            fill_row(rows, Wrap::Mirror, &taps, &bytes, &mut best);
+            assert_eq!(plain, best, "{kernel:?}");
+            let floats = Normals::<f32, 4>::new(factors);
+            let (mut plain, mut best) = (vec![0.0; 4 * width], vec![0.0; 4 * width]);
+            fill_row_here(rows, Wrap::Repeat, &taps, &floats, &mut plain);
+            fill_row(rows, Wrap::Repeat, &taps, &floats, &mut best);
+            assert_eq!(plain, best, "{kernel:?}");
+            #[cfg(target_arch = "x86_64")]
+            if std::arch::is_x86_feature_detected!("avx2") {
+                #[allow(unsafe_code)]
+                // SAFETY: the processor has the instructions, asked on the line above.
+                unsafe {
+                    fill_row_avx2(rows, Wrap::Repeat, &taps, &floats, &mut best);
+                }
+                assert_eq!(plain, best, "{kernel:?}");
+            }
+        }
     }
 }
