@@ -15,6 +15,10 @@ use heightfield::{Extent, HeightField, Wrap};
 
 static BAKES: AtomicUsize = AtomicUsize::new(0);
 
+const CHANNELS: &[Channel] = &[Channel::fixed("level", bake::encode::Range::UNIT)];
+const OPTIONS: &[MapOption] =
+    &[MapOption { name: "gain", summary: "", kind: Kind::Number { default: 1.0, min: 0.0, max: 1.0 } }];
+
 const fn map(name: &'static str, version: u32) -> Map {
     Map {
         info: MapInfo {
@@ -24,12 +28,8 @@ const fn map(name: &'static str, version: u32) -> Map {
             version,
             costly: true,
             form: Form::Levels,
-            channels: &[Channel::fixed("level", bake::encode::Range::UNIT)],
-            options: &[MapOption {
-                name: "gain",
-                summary: "",
-                kind: Kind::Number { default: 1.0, min: 0.0, max: 1.0 },
-            }],
+            channels: CHANNELS,
+            options: OPTIONS,
         },
         plan: |grid, _| Plan::levels([grid.width, grid.height]),
         bake: |field, options, mut progress| {
@@ -87,7 +87,7 @@ fn the_same_is_found_and_anything_else_is_not() {
     let usual = || field(1, 8, 4, Wrap::Repeat, 0.5);
     assert_eq!(bakes(&cache, &usual(), &MAP, 1.0), 1);
     assert_eq!(bakes(&cache, &usual(), &MAP, 1.0), 0, "another field with the same heights");
-    let mut once = |field: HeightField, map, gain| assert_eq!(bakes(&cache, &field, map, gain), 1);
+    let once = |field: HeightField, map, gain| assert_eq!(bakes(&cache, &field, map, gain), 1);
     once(field(2, 8, 4, Wrap::Repeat, 0.5), &MAP, 1.0);
     once(field(1, 4, 8, Wrap::Repeat, 0.5), &MAP, 1.0);
     once(field(1, 8, 4, Wrap::Clamp, 0.5), &MAP, 1.0);

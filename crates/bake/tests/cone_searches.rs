@@ -175,6 +175,19 @@ fn rays_in_all_directions_end() {
 }
 
 #[test]
+fn maps_of_other_sizes_and_ratios_out_of_range_are_refused() {
+    use heightfield::{ConeKind, ConeMap};
+    let field = noise(4, 3, Wrap::Clamp, 1);
+    let make = |ratios: &[f32]| ConeMap::new(&field, ConeKind::Cone, ratios).unwrap_err().to_string();
+    assert!(make(&[0.5; 11]).contains("needs 12 values, got 11"), "{}", make(&[0.5; 11]));
+    for bad in [f32::NAN, -0.1, 1.1, f32::INFINITY] {
+        let mut ratios = [0.5; 12];
+        ratios[6] = bad;
+        assert!(make(&ratios).contains("row 1, column 2"), "{}", make(&ratios));
+    }
+}
+
+#[test]
 fn a_map_that_is_not_there_is_named() {
     let field = noise(8, 8, Wrap::Repeat, 1);
     let technique = Technique::named("relaxed_cone").unwrap();
