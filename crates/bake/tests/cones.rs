@@ -201,7 +201,10 @@ fn relaxed_cones_are_pierced_at_most_once() {
                 let empty = cones(&field, ConeMode::Conservative);
                 for (at, &ratio) in map.iter().enumerate() {
                     // Bounds are found in another order, and differ a little.
-                    assert!(ratio >= 0.98 * empty[at] && ratio <= 1.0, "{name} {w}x{h} {wrap:?} {at}: narrower");
+                    assert!(
+                        ratio >= 0.98 * empty[at] && ratio <= 1.0,
+                        "{name} {w}x{h} {wrap:?} {at}: narrower"
+                    );
                     for _ in 0..6 {
                         let x = [
                             ((at % w) as f64 + 0.5 + random.range(-1.0, 1.0)) / w as f64,
