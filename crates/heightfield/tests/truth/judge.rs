@@ -7,6 +7,8 @@ use crate::surface::Surface;
 
 /// Largest error of the depth, as a share of the relief's: `|dt| |dz|`.
 pub const DEPTH: f64 = 1e-6;
+/// Tiles that a ray may cross at least before the search gives up on it.
+pub const PROMISED_TILES: f64 = 1e5;
 /// Contacts shallower than this may be seen or not: `f64` itself cannot tell.
 pub const GRAZE: f64 = 1e-9;
 
@@ -58,8 +60,10 @@ pub fn judge(surface: &Surface, kind: Kind, (origin, direction): Ray, answer: An
     let rounding = t.abs() * f64::from(f32::EPSILON) * 0.5 + f64::from(f32::MIN_POSITIVE);
     let seen = surface.look(origin, direction, lift, slack, t + 2.0 * rounding);
     if answer.status == Status::Unconverged as u8 {
-        // Only a level ray may go on for ever.
-        let endless = direction[2] == 0.0 && !seen.complete && seen.touch.is_infinite();
+        // Only a ray that runs on for more tiles than the search promises may be given up.
+        let room = if direction[2] > 0.0 { 1.0 - origin[2] } else { origin[2] };
+        let tiles = direction[0].hypot(direction[1]) * room / direction[2].abs();
+        let endless = tiles > PROMISED_TILES && !seen.complete && seen.touch.is_infinite();
         return (if endless { Verdict::Unjudged } else { Verdict::Unconverged }, 0.0);
     }
     if answer.status != Status::Hit as u8 {
