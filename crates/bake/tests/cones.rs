@@ -44,7 +44,7 @@ fn texel_mode_is_the_textbook_definition() {
                 for (at, (found, expected)) in found.iter().zip(brute_force(&field)).enumerate() {
                     let error = f64::from(*found) - expected;
                     assert!(
-                        error <= 0.0 && error >= -1e-6,
+                        (-1e-6..=0.0).contains(&error),
                         "{name} {w}x{h} {wrap:?} {at}: {found}, {expected}"
                     );
                 }

@@ -13,6 +13,9 @@ use heightfield::{Extent, Wrap};
 use mesh::Mesh;
 use render::{AovSet, Draw, Light, Material, Request, Scene, TechniqueChoice};
 
+/// The direction of a point of a cube face.
+type Direction = Box<dyn Fn(f32, f32) -> Vec3>;
+
 const TEXELS: usize = 16;
 const FACE: usize = 64;
 
@@ -36,7 +39,7 @@ fn cube(direction: Vec3) -> Vec3 {
     let longest = size.max_element();
     let at = direction / longest;
     // Right and down on the face, and back, as cube maps are laid out.
-    let (s, t, back): (f32, f32, Box<dyn Fn(f32, f32) -> Vec3>) = if size.x == longest {
+    let (s, t, back): (f32, f32, Direction) = if size.x == longest {
         let sign = at.x.signum();
         (-at.z * sign, -at.y, Box::new(move |s, t| Vec3::new(sign, -t, -s * sign)))
     } else if size.y == longest {
