@@ -25,18 +25,6 @@ pub struct M(__m256i);
 // SAFETY of every `unsafe` block in this file: code with these types is only reachable through
 // `run_avx2`, which the processor was asked for, and slices are measured before they are read or
 // written as a whole vector.
-macro_rules! operators {
-    ($($trait:ident $function:ident $type:ident ($intrinsic:ident);)*) => { $(
-        impl $trait for $type {
-            type Output = Self;
-            #[inline(always)]
-            fn $function(self, other: Self) -> Self {
-                Self(unsafe { $intrinsic(self.0, other.0) })
-            }
-        }
-    )* };
-}
-
 operators! {
     Add add F(_mm256_add_ps);
     Sub sub F(_mm256_sub_ps);
@@ -48,18 +36,6 @@ operators! {
     BitAnd bitand I(_mm256_and_si256);
     BitAnd bitand M(_mm256_and_si256);
     BitOr bitor M(_mm256_or_si256);
-}
-
-macro_rules! wide_operators {
-    ($($trait:ident $function:ident ($intrinsic:ident);)*) => { $(
-        impl $trait for D {
-            type Output = Self;
-            #[inline(always)]
-            fn $function(self, other: Self) -> Self {
-                unsafe { D($intrinsic(self.0, other.0), $intrinsic(self.1, other.1)) }
-            }
-        }
-    )* };
 }
 
 wide_operators! {

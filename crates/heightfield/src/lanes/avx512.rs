@@ -25,18 +25,6 @@ pub struct M(__mmask16);
 // SAFETY of every `unsafe` block in this file: code with these types is only reachable through
 // `run_avx512`, which the processor was asked for, and slices are measured before they are read or
 // written as a whole vector.
-macro_rules! operators {
-    ($($trait:ident $function:ident $type:ident ($intrinsic:ident);)*) => { $(
-        impl $trait for $type {
-            type Output = Self;
-            #[inline(always)]
-            fn $function(self, other: Self) -> Self {
-                Self(unsafe { $intrinsic(self.0, other.0) })
-            }
-        }
-    )* };
-}
-
 operators! {
     Add add F(_mm512_add_ps);
     Sub sub F(_mm512_sub_ps);
@@ -46,18 +34,6 @@ operators! {
     Sub sub I(_mm512_sub_epi32);
     Mul mul I(_mm512_mullo_epi32);
     BitAnd bitand I(_mm512_and_si512);
-}
-
-macro_rules! wide_operators {
-    ($($trait:ident $function:ident ($intrinsic:ident);)*) => { $(
-        impl $trait for D {
-            type Output = Self;
-            #[inline(always)]
-            fn $function(self, other: Self) -> Self {
-                unsafe { D($intrinsic(self.0, other.0), $intrinsic(self.1, other.1)) }
-            }
-        }
-    )* };
 }
 
 wide_operators! {

@@ -14,6 +14,37 @@
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 use std::sync::OnceLock;
 
+// SAFETY of the operators: code with these types is only reachable through `run_avx2` and `run_avx512`,
+// whose instructions the processor was asked for.
+
+/// Operators of vector types that hold one register, by the instruction of each.
+#[cfg(target_arch = "x86_64")]
+macro_rules! operators {
+    ($($trait:ident $function:ident $type:ident ($intrinsic:ident);)*) => { $(
+        impl $trait for $type {
+            type Output = Self;
+            #[inline(always)]
+            fn $function(self, other: Self) -> Self {
+                Self(unsafe { $intrinsic(self.0, other.0) })
+            }
+        }
+    )* };
+}
+
+/// Operators of the type that holds two registers, `D`.
+#[cfg(target_arch = "x86_64")]
+macro_rules! wide_operators {
+    ($($trait:ident $function:ident ($intrinsic:ident);)*) => { $(
+        impl $trait for D {
+            type Output = Self;
+            #[inline(always)]
+            fn $function(self, other: Self) -> Self {
+                unsafe { D($intrinsic(self.0, other.0), $intrinsic(self.1, other.1)) }
+            }
+        }
+    )* };
+}
+
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 #[cfg(target_arch = "x86_64")]
