@@ -8,8 +8,8 @@
 use glam::Vec3;
 
 use super::Search;
-use super::cone_walk::{Cones, walk};
-use crate::{ConeKind, Found, HeightField, Status};
+use super::cone_walk::ConeWalk;
+use crate::{ConeKind, Found, HeightField};
 
 technique! {
     /// Parameters of [`search`](Search::search) as described above.
@@ -22,11 +22,8 @@ technique! {
 impl Cone {
     #[inline(always)]
     fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, from_surface: bool) -> Found {
-        let Some(map) = field.cone_map(ConeKind::Cone) else {
-            return Found { tau: 0.0, status: Status::Unconverged, steps: 0 };
-        };
-        let cones = Cones { empty: map.values(), relaxed: &[], refine: 0, most_steps: self.steps };
-        walk::<false, false>(field, &cones, start, delta, from_surface)
+        let walk = ConeWalk { empty: ConeKind::Cone, relaxed: None, refine: 0, most_steps: self.steps };
+        walk.trace::<false>(field, start, delta, from_surface)
     }
 }
 
@@ -39,11 +36,5 @@ impl Search for Cone {
     #[inline(always)]
     fn leave(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
         self.trace(field, start, delta, true)
-    }
-
-    #[inline(always)]
-    fn occluded(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> bool {
-        let found = self.trace(field, start, delta, true);
-        found.status == Status::Hit && found.tau <= 1.0
     }
 }

@@ -337,7 +337,7 @@ pub fn cell_position(field: &HeightField, u: f64, v: f64) -> [f64; 2] {
 
 impl Exact {
     #[inline(always)]
-    fn trace_f32(field: &HeightField, start: Vec3, delta: Vec3, from_surface: bool) -> CellHit<f32> {
+    fn trace_f32(field: &HeightField, start: Vec3, delta: Vec3, from_surface: bool) -> Found {
         let first = field.first_texel() as f32;
         let (w, h) = (field.width() as f32, field.height() as f32);
         let ray = CellRay {
@@ -345,22 +345,20 @@ impl Exact {
             direction: [delta.x * w, delta.y * h, delta.z],
             from_surface,
         };
-        trace(field, field.pyramid(), &ray, MAX_STEPS_F32)
+        let hit = trace(field, field.pyramid(), &ray, MAX_STEPS_F32);
+        Found { tau: hit.t, status: hit.status, steps: hit.steps }
     }
 }
 
 impl Search for Exact {
     #[inline(always)]
     fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
-        let hit = Self::trace_f32(field, start, delta, false);
-        Found { tau: hit.t, status: hit.status, steps: hit.steps }
+        Self::trace_f32(field, start, delta, false)
     }
 
     #[inline(always)]
-    fn occluded(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> bool {
-        let hit = Self::trace_f32(field, start, delta, true);
-        // What lies beyond the light throws no shadow.
-        hit.status == Status::Hit && hit.t <= 1.0
+    fn leave(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
+        Self::trace_f32(field, start, delta, true)
     }
 
     #[inline(always)]

@@ -6,7 +6,7 @@ use glam::Vec3;
 use crate::chunk::Chunk;
 use crate::march::march_by_segments;
 use crate::technique::TechniqueInfo;
-use crate::{Found, HeightField};
+use crate::{Found, HeightField, Status};
 
 /// What each technique's file provides; the twin of the two functions in its WGSL file.
 pub trait Search: Sized {
@@ -22,8 +22,13 @@ pub trait Search: Sized {
         self.search(field, start, delta, cos_theta)
     }
 
-    /// Whether a segment that starts on the surface and goes up is blocked.
-    fn occluded(&self, field: &HeightField, start: Vec3, delta: Vec3, cos_theta: f32) -> bool;
+    /// Whether a segment that starts on the surface and goes up is blocked. What lies beyond its end, the
+    /// light, throws no shadow.
+    #[inline(always)]
+    fn occluded(&self, field: &HeightField, start: Vec3, delta: Vec3, cos_theta: f32) -> bool {
+        let found = self.leave(field, start, delta, cos_theta);
+        found.status == Status::Hit && found.tau <= 1.0
+    }
 
     /// Runs the search over many rays.
     #[inline(always)]
@@ -79,6 +84,7 @@ macro_rules! technique {
 }
 
 pub mod binary;
+pub mod cell_walk;
 pub mod cone;
 pub mod cone_texel;
 pub mod cone_walk;

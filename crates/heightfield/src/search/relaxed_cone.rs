@@ -9,8 +9,8 @@
 use glam::Vec3;
 
 use super::Search;
-use super::cone_walk::{Cones, walk};
-use crate::{ConeKind, Found, HeightField, Status};
+use super::cone_walk::ConeWalk;
+use crate::{ConeKind, Found, HeightField};
 
 technique! {
     /// Parameters of [`search`](Search::search) as described above.
@@ -23,18 +23,13 @@ technique! {
 impl RelaxedCone {
     #[inline(always)]
     fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, from_surface: bool) -> Found {
-        let (Some(empty), Some(relaxed)) =
-            (field.cone_map(ConeKind::Cone), field.cone_map(ConeKind::RelaxedCone))
-        else {
-            return Found { tau: 0.0, status: Status::Unconverged, steps: 0 };
-        };
-        let cones = Cones {
-            empty: empty.values(),
-            relaxed: relaxed.values(),
+        let walk = ConeWalk {
+            empty: ConeKind::Cone,
+            relaxed: Some(ConeKind::RelaxedCone),
             refine: self.refine,
             most_steps: self.steps,
         };
-        walk::<false, true>(field, &cones, start, delta, from_surface)
+        walk.trace::<false>(field, start, delta, from_surface)
     }
 }
 
@@ -47,11 +42,5 @@ impl Search for RelaxedCone {
     #[inline(always)]
     fn leave(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
         self.trace(field, start, delta, true)
-    }
-
-    #[inline(always)]
-    fn occluded(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> bool {
-        let found = self.trace(field, start, delta, true);
-        found.status == Status::Hit && found.tau <= 1.0
     }
 }

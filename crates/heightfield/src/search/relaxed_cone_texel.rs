@@ -8,8 +8,8 @@
 use glam::Vec3;
 
 use super::Search;
-use super::cone_walk::{Cones, walk};
-use crate::{ConeKind, Found, HeightField, Status};
+use super::cone_walk::ConeWalk;
+use crate::{ConeKind, Found, HeightField};
 
 technique! {
     /// Parameters of [`search`](Search::search) as described above.
@@ -22,18 +22,13 @@ technique! {
 impl RelaxedConeTexel {
     #[inline(always)]
     fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, from_surface: bool) -> Found {
-        let (Some(empty), Some(relaxed)) =
-            (field.cone_map(ConeKind::ConeTexel), field.cone_map(ConeKind::RelaxedConeTexel))
-        else {
-            return Found { tau: 0.0, status: Status::Unconverged, steps: 0 };
-        };
-        let cones = Cones {
-            empty: empty.values(),
-            relaxed: relaxed.values(),
+        let walk = ConeWalk {
+            empty: ConeKind::ConeTexel,
+            relaxed: Some(ConeKind::RelaxedConeTexel),
             refine: self.refine,
             most_steps: self.steps,
         };
-        walk::<true, true>(field, &cones, start, delta, from_surface)
+        walk.trace::<true>(field, start, delta, from_surface)
     }
 }
 
@@ -46,11 +41,5 @@ impl Search for RelaxedConeTexel {
     #[inline(always)]
     fn leave(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
         self.trace(field, start, delta, true)
-    }
-
-    #[inline(always)]
-    fn occluded(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> bool {
-        let found = self.trace(field, start, delta, true);
-        found.status == Status::Hit && found.tau <= 1.0
     }
 }
