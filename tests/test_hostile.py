@@ -281,7 +281,7 @@ def test_senseless_arguments(name: str, tmp_path: Path, capfd: pytest.CaptureFix
     assert err == []
     saved = tmp_path / "saved"
     if saved.exists():
-        assert not [path for path in saved.iterdir() if path.suffix not in (".png", ".exr", ".npy")]
+        assert not [path for path in saved.iterdir() if path.suffix not in (".png", ".exr", ".npy", ".json")]
 
 
 def draw(arguments: dict[str, Any]) -> bw.Frame:

@@ -48,7 +48,8 @@ class Hits:
         Unit normal of the bilinear surface in texture space, ``(-dh/du, -dh/dv, 1)`` normalised;
         NaN where there is no hit.
     steps : ndarray of uint32, (N,)
-        Height reads or nodes visited.
+        Height reads or nodes visited. ``exact`` shares some with the neighbours of a ray, so its counts
+        depend on them a little.
     status : ndarray of uint8, (N,)
         0 hit, 1 left without meeting the surface, 2 unconverged.
     outputs : tuple of str

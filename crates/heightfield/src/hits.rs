@@ -64,7 +64,8 @@ pub struct Hits {
     pub z: Option<Vec<f32>>,
     /// Unit normal of the bilinear surface in texture space, `(-dh/du, -dh/dv, 1)` normalised, N * 3.
     pub normal: Option<Vec<f32>>,
-    /// Height reads or nodes visited, N.
+    /// Height reads or nodes visited, N. The exact search shares some with the rays beside a ray, so its
+    /// count depends on them a little.
     pub steps: Option<Vec<u32>>,
     /// [`Status`](crate::Status) as a number, N.
     pub status: Option<Vec<u8>>,
