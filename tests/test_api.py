@@ -51,7 +51,7 @@ SIGNATURES = {
     "Light.point": "position color intensity",
     "Material": "height albedo normal * specular shininess normal_convention double_sided",
     "render": "mesh material * camera lights technique size shadows aovs device ambient background",
-    "compare": "source techniques * elevations device rays repeats seed progress",
+    "compare": "source techniques * elevations formats device rays repeats seed progress",
     "dequantise": "source * bits progress **options",
     "tile_report": "source **options",
     "heights_from_normals": "normals * convention wrap tile_size base kernel steepest progress",

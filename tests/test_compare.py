@@ -100,8 +100,11 @@ def test_the_seed_fixes_everything_but_the_time(posts: bw.HeightMap) -> None:
 def test_the_default_sweep_is_quick_and_tries_every_technique() -> None:
     small = bw.HeightMap.procedural("bricks", 128)
     made = bw.compare(small, elevations=[30], device="cpu", rays=500, repeats=1)
-    assert {row["technique"] for row in made.rows} == set(bw.techniques.marching())
-    assert len(made.select("all")) > len(bw.techniques.marching())
+    # The map of relaxed_cone_texel takes long to bake: it has to be asked for.
+    assert {row["technique"] for row in made.rows} == set(bw.techniques.marching()) - {"relaxed_cone_texel"}
+    labels = {row["label"] for row in made.select("all")}
+    assert labels.isdisjoint(row["label"] for row in made.dropped)
+    assert len(labels) + len(made.dropped) > len(bw.techniques.marching()) + 10
 
 
 # Negative controls: what is planted must be found.
@@ -121,7 +124,7 @@ def measured(
     reference: Any, uv: np.ndarray, z: np.ndarray, status: np.ndarray | None = None
 ) -> dict[str, Any]:
     status = np.zeros(len(z), np.uint8) if status is None else status
-    return reference.measure(uv, z, status, np.zeros(len(z), np.uint8), 1)[0]
+    return reference.measure(uv, z, status, np.zeros(len(z), np.uint8), [[0]])[0]
 
 
 def test_right_hits_pass_and_a_tenth_of_a_texel_is_flagged(posts: bw.HeightMap) -> None:
@@ -161,7 +164,7 @@ def test_arrays_that_do_not_fit_are_refused(posts: bw.HeightMap) -> None:
     with pytest.raises(ValueError, match="expected 4000"):
         measured(reference, hits.uv[:10], hits.z)
     with pytest.raises(ValueError, match="groups"):
-        reference.measure(hits.uv, hits.z, np.zeros(len(hits.z), np.uint8), np.zeros(3, np.uint8), 1)
+        reference.measure(hits.uv, hits.z, np.zeros(len(hits.z), np.uint8), np.zeros(3, np.uint8), [[0]])
     with pytest.raises(ValueError, match=r"shape \(N, 3\)"):
         _bumpwgpu.SegmentReference(posts._field, starts, deltas[:5])
     deltas[4] = np.nan
@@ -379,6 +382,11 @@ check("pictures", !document.getElementById("pictures").hidden && document.getEle
 change(document.getElementById("mode"), "heat");
 check("heat", document.getElementById("over").src.startsWith("data:image/png"));
 check("key", !document.getElementById("heat-key").hidden);
+const errors = document.getElementById("over").src;
+change(document.getElementById("mode"), "steps");
+check("steps", document.getElementById("over").src.startsWith("data:image/png")
+  && document.getElementById("over").src !== errors
+  && document.getElementById("heat-text").textContent.startsWith("Height reads"));
 const slider = document.getElementById("slider");
 slider.value = 20;
 slider.dispatchEvent(new Event("input"));
@@ -395,6 +403,9 @@ heads[p99].querySelector("button").click();
 check("up", sorted(column()) && heads[p99].getAttribute("aria-sort") === "ascending");
 heads[p99].querySelector("button").click();
 check("down", sorted(column().reverse()));
+change(document.getElementById("region"), "silhouette");
+check("region", shown().length > 0 && shown().every((row) => row.dataset.region === "silhouette"
+  && row.dataset.elevation === "10.0"));
 check("narrow", document.documentElement.scrollWidth <= window.innerWidth);
 </script>
 """
@@ -415,7 +426,7 @@ def test_the_report_works_in_a_browser(result: bw.CompareResult, tmp_path: Path)
     title = re.search(r"<title>(.*?)</title>", done.stdout)
     assert title, done.stderr
     assert "FAILED" not in title[1]
-    assert title[1].count("ok:") == 9
+    assert title[1].count("ok:") == 11
 
 
 def test_pictures_show_the_map_and_where_it_is_wrong(result: bw.CompareResult) -> None:

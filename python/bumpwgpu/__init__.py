@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import os as _os
 
-from . import surfaces, techniques
+from . import engines, surfaces, techniques
 from ._bumpwgpu import VERSION as __version__
 from .baking import bake, bake_file
-from .compare import CompareResult, Recommendation, Scene, compare
+from .compare import CompareResult, MipAdvice, Recommendation, Scene, compare
+from .engines import EngineSettings
 from .errors import BakeError, BumpError, BumpWarning, CompareError, MeshError, RenderError
 from .frames import Tangents, tangents
 from .heightmap import HeightMap
@@ -50,6 +51,7 @@ __all__ = [
     "CompareError",
     "CompareResult",
     "CurlEvidence",
+    "EngineSettings",
     "Frame",
     "HeightEvidence",
     "HeightMap",
@@ -64,6 +66,7 @@ __all__ = [
     "MeshMaps",
     "MeshMaterial",
     "MeshReport",
+    "MipAdvice",
     "NormalReport",
     "Part",
     "Recommendation",
@@ -78,6 +81,7 @@ __all__ = [
     "check_normals",
     "compare",
     "dequantise",
+    "engines",
     "heights_from_normals",
     "info",
     "march",

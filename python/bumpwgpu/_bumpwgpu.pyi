@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 _Path: TypeAlias = str | os.PathLike[str]
 _Parameters: TypeAlias = Sequence[tuple[str, float]]
-_Setting: TypeAlias = tuple[str, _Parameters]
+_Setting: TypeAlias = tuple[str, _Parameters, str, str]
+_Measured: TypeAlias = tuple[str, Sequence[float], float, float, float]
 _Progress: TypeAlias = Callable[..., object] | None
 _Options: TypeAlias = Sequence[tuple[str, bool | int | float | str]]
 _Vector: TypeAlias = tuple[float, float, float]
@@ -41,12 +42,15 @@ __all__ = [
     "bend_normals",
     "check_normals",
     "compare_front",
+    "compare_memory",
     "compare_planar",
     "compare_recommend",
+    "compare_verify",
     "decode_image",
     "dequantise",
     "derivatives",
     "effective_bits",
+    "export_search",
     "integrate_normals",
     "map_bytes",
     "map_registry",
@@ -180,20 +184,21 @@ class CompareView:
     def __new__(cls, field: Field, width: int, height: int) -> CompareView: ...
     def picture(
         self, technique: str, parameters: _Parameters
-    ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]: ...
+    ) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.float32]]: ...
 
 @final
 class SegmentReference:
     def __new__(
         cls, field: Field, starts: NDArray[np.float32], deltas: NDArray[np.float32]
     ) -> SegmentReference: ...
+    def silhouettes(self) -> NDArray[np.bool_]: ...
     def measure(
         self,
         uv: NDArray[np.float32],
         z: NDArray[np.float32],
         status: NDArray[np.uint8],
         group: NDArray[np.uint8],
-        groups: int,
+        sets: Sequence[Sequence[int]],
     ) -> tuple[dict[str, Any], list[dict[str, Any]], NDArray[np.float32]]: ...
 
 def adapters() -> list[tuple[str, str, str, str]]: ...
@@ -219,28 +224,29 @@ def bake_map(
     total: int,
 ) -> tuple[list[NDArray[Any]], list[tuple[float, float]]]: ...
 def check_normals(normals: NDArray[np.float32], wrap: str, heights: Field | None) -> dict[str, Any]: ...
-def compare_front(
-    measured: Sequence[tuple[str, Sequence[float], float, float]], max_failure_rate: float
-) -> list[tuple[int, list[int]]]: ...
+def compare_front(measured: Sequence[_Measured], max_failure_rate: float) -> list[tuple[int, list[int]]]: ...
+def compare_memory(field: Field, setting: _Setting) -> int: ...
 def compare_planar(
     field: Field,
-    techniques: Sequence[_Setting],
+    settings: Sequence[_Setting],
     elevations: Sequence[float],
     rays: int,
     repeats: int,
     seed: int,
     device: str,
     progress: _Progress,
-) -> tuple[list[dict[str, Any]], str | None]: ...
+) -> tuple[list[dict[str, Any]], list[dict[str, Any]], str | None]: ...
 def compare_recommend(
-    measured: Sequence[tuple[str, Sequence[float], float, float]],
-    max_error_texels: float,
-    max_failure_rate: float,
+    measured: Sequence[_Measured], budget: tuple[float, float, float, float]
 ) -> tuple[int | None, str]: ...
+def compare_verify(
+    field: Field, setting: _Setting, elevations: Sequence[float], rays: int, seed: int
+) -> dict[str, Any]: ...
 def decode_image(data: bytes) -> _Decoded: ...
 def dequantise(field: Field, quantum: float, progress: _Progress) -> NDArray[np.float32]: ...
 def derivatives() -> list[str]: ...
 def effective_bits(samples: NDArray[Any]) -> int: ...
+def export_search(technique: str, parameters: _Parameters, wrap: str, language: str) -> str: ...
 def integrate_normals(
     normals: NDArray[np.float32],
     convention: str,

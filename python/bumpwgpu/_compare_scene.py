@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,8 +20,13 @@ from .techniques import Technique
 
 if TYPE_CHECKING:
     from .compare import CompareResult, Progress, Row, Scene
+    from .heightmap import HeightMap
+    from .scene import Camera
 
-__all__ = ["compare_scene"]
+__all__ = ["compare_scene", "verify_scene"]
+
+#: As in compare.REGIONS.
+REGIONS = ("interior", "silhouette", "shadow")
 
 #: The exact picture must agree with the reference in double precision to this many texels at p99;
 #: measured on a quad, a cube and a torus: 0.002.
@@ -33,14 +38,29 @@ _NORMAL_AOV_FLOOR = 1e-6
 
 
 @dataclass(frozen=True)
-class _Truth:
-    """What the exact picture and the reference say about the pixels of the mesh."""
+class _View:
+    """One camera: the exact picture, and which pixels of it show the mesh."""
 
+    camera: Camera
     exact: Frame
     pixels: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class _Truth:
+    """What the exact pictures and the reference say about the pixels of the mesh, camera by camera.
+
+    `groups` is the index of a pixel's elevation times the number of regions, plus that of its region.
+    """
+
+    views: list[_View]
     reference: Any
     groups: NDArray[np.uint8]
     angles: list[float]
+
+    @property
+    def count(self) -> int:
+        return len(self.groups)
 
 
 def compare_scene(
@@ -60,38 +80,49 @@ def compare_scene(
     total = 1 + len(settings) * (1 + repeats)
     tell = _teller(progress, total)
     tell("exact surface")
-    truth = _truth(scene, angles)
+    truth = _truth(scene, scene.cameras, angles)
     has_flip = _has_flip()
     rows: list[Row] = []
     exact = _techniques.get("exact")
     picture, check, _ = _measure(scene, exact, truth, False)
     pictures = [Picture("exact", *picture)]
+    height_map = scene.material.height
+    assert height_map is not None
     for technique in settings:
         tell(f"errors of {technique!r}")
         name = label(technique.name, technique.parameters)
         picture, metrics, by_angle = _measure(scene, technique, truth, has_flip)
         if technique != exact:
             pictures.append(Picture(name, *picture))
-        start = {"technique": technique.name, "parameters": technique.parameters, "label": name}
+        start = {
+            "technique": technique.name,
+            "parameters": technique.parameters,
+            "label": name,
+            **_stored(technique, height_map),
+        }
         rows += [{**start, "elevation": angle, **part} for angle, part in by_angle]
         rows.append({**start, "elevation": "all", **metrics})
     times: dict[str, list[float]] = {row["label"]: [] for row in rows}
     left_out: dict[str, None] = {}
     for turn in range(1, repeats + 1):
-        for technique in settings:
+        # Every other time backwards: a machine that slows down is then fair to all.
+        for technique in settings if turn % 2 else reversed(settings):
             tell(f"timing {technique!r}, round {turn} of {repeats}")
-            frame = _shoot(scene, technique)
-            times[label(technique.name, technique.parameters)].append(frame.stats["draw_ms"])
-            left_out.update(dict.fromkeys(frame.warnings))
+            spent = 0.0
+            for camera in scene.cameras:
+                frame = _shoot(scene, camera, technique)
+                spent += frame.stats["draw_ms"]
+                left_out.update(dict.fromkeys(frame.warnings))
+            times[label(technique.name, technique.parameters)].append(spent)
     tell("done")
-    count = int(truth.pixels.sum())
-    rows = [{**row, **_times(times[row["label"]], count)} for row in rows]
+    rows = [{**row, **_times(times[row["label"]], truth.count, len(scene.cameras))} for row in rows]
     _check_exact(check)
     environment = {
         **machine(True),
-        "map": repr(scene.material.height),
+        "map": repr(height_map),
         "mesh": repr(scene.mesh),
-        "picture": f"{scene.size[0]} x {scene.size[1]}, {count} pixels compared",
+        "picture": f"{scene.size[0]} x {scene.size[1]}, {truth.count} pixels compared",
+        "cameras": len(scene.cameras),
         "repeats": repeats,
         "exact picture against double precision": {
             key: check[key]
@@ -101,6 +132,46 @@ def compare_scene(
         "time": "drawing a frame, shading and shadows included, over the pixels compared",
     }
     return CompareResult(rows, "scene", environment, scene, pictures)
+
+
+def verify_scene(scene: Scene, row: Row, angles: list[float], elevation: float | str) -> Row:
+    """Metrics of a setting from cameras a little aside of those it was chosen by."""
+    aside = [_turned(camera, degrees) for camera in scene.cameras for degrees in (-2.3, 1.7)]
+    truth = _truth(scene, aside, angles)
+    technique = type(_techniques.get(row["technique"]))(**row["parameters"])
+    _, metrics, by_angle = _measure(scene, technique, truth, False)
+    return metrics if elevation == "all" else dict(by_angle).get(float(elevation), metrics)
+
+
+def _turned(camera: Camera, degrees: float) -> Camera:
+    """The camera moved around its target, about the up direction and a quarter as much over it."""
+    up = np.asarray(camera.up, np.float64) / np.linalg.norm(camera.up)
+    arm = np.subtract(camera.eye, camera.target)
+    side = np.cross(up, arm)
+    side /= np.linalg.norm(side)
+    turned = _rotated(_rotated(arm, up, degrees), side, 0.25 * degrees)
+    x, y, z = (float(part) for part in np.add(camera.target, turned))
+    return replace(camera, eye=(x, y, z))
+
+
+def _rotated(vector: Any, axis: NDArray[np.float64], degrees: float) -> NDArray[np.float64]:
+    """Rodrigues' rotation."""
+    turn = math.radians(degrees)
+    along = axis * np.dot(axis, vector) * (1.0 - math.cos(turn))
+    rotated: NDArray[np.float64] = (
+        np.multiply(vector, math.cos(turn)) + np.cross(axis, vector) * math.sin(turn) + along
+    )
+    return rotated
+
+
+def _stored(technique: Technique, height_map: HeightMap) -> Row:
+    """What a scene's textures take: 32-bit floats."""
+    plain = ("r32float", "r32float")
+    if not technique.marches:
+        return {"heights_format": plain[0], "cones_format": None, "memory_bytes": 4 * height_map.array.size}
+    memory = _bumpwgpu.compare_memory(height_map._field, (technique.name, [], *plain))
+    cones = plain[1] if "cone" in technique.name else None
+    return {"heights_format": plain[0], "cones_format": cones, "memory_bytes": memory}
 
 
 def _teller(progress: Progress | None, total: int) -> Callable[[str], None]:
@@ -128,7 +199,7 @@ def _has_flip() -> bool:
     return True
 
 
-def _shoot(scene: Scene, technique: Technique, aovs: tuple[str, ...] = ()) -> Frame:
+def _shoot(scene: Scene, camera: Camera, technique: Technique, aovs: tuple[str, ...] = ()) -> Frame:
     # A comparison tries techniques on lights and materials that are not made for them; what each of
     # them leaves out is stated once, in the environment.
     with warnings.catch_warnings():
@@ -136,7 +207,7 @@ def _shoot(scene: Scene, technique: Technique, aovs: tuple[str, ...] = ()) -> Fr
         return render(
             scene.mesh,
             scene.material,
-            camera=scene.camera,
+            camera=camera,
             lights=scene.lights or None,
             technique=technique,
             size=scene.size,
@@ -145,71 +216,122 @@ def _shoot(scene: Scene, technique: Technique, aovs: tuple[str, ...] = ()) -> Fr
         )
 
 
-def _truth(scene: Scene, angles: list[float]) -> _Truth:
+def _truth(scene: Scene, cameras: Sequence[Camera], angles: list[float]) -> _Truth:
     assert scene.material.height is not None
-    exact = _shoot(scene, _techniques.get("exact"), (*_AOVS, "ray_start", "ray_delta"))
-    start, delta = exact.aovs["ray_start"], exact.aovs["ray_delta"]
-    pixels = (exact.aovs["mask"] > 0.0) & (delta[:, :, 2] < 0.0)
-    if not pixels.any():
+    views, starts, deltas, elevations, edges, dark = [], [], [], [], [], []
+    for camera in cameras:
+        exact = _shoot(scene, camera, _techniques.get("exact"), (*_AOVS, "ray_start", "ray_delta"))
+        start, delta = exact.aovs["ray_start"], exact.aovs["ray_delta"]
+        mesh = exact.aovs["mask"] > 0.0
+        pixels = mesh & (delta[:, :, 2] < 0.0)
+        views.append(_View(camera, exact, pixels))
+        starts.append(start[pixels])
+        deltas.append(delta[pixels])
+        elevations.append(_elevation(scene, camera, pixels))
+        edges.append(_outline(mesh)[pixels])
+        dark.append(exact.aovs["shadow"][pixels] > _SHADOW_TOLERANCE)
+    if not any(view.pixels.any() for view in views):
         raise CompareError("no pixel shows the mesh from the front: nothing to compare; move the camera")
     reference = _bumpwgpu.SegmentReference(
-        scene.material.height._field, np.ascontiguousarray(start[pixels]), np.ascontiguousarray(delta[pixels])
+        scene.material.height._field,
+        np.ascontiguousarray(np.concatenate(starts)),
+        np.ascontiguousarray(np.concatenate(deltas)),
     )
-    smooth = _shoot(scene, _techniques.get("flat"), ("position", "normal"))
-    view = np.asarray(scene.camera.eye) - smooth.aovs["position"][pixels].astype(np.float64)
+    seen = np.concatenate(elevations)
+    angle = np.abs(seen[:, None] - np.array(angles)[None, :]).argmin(axis=1)
+    region = np.where(np.concatenate(dark), REGIONS.index("shadow"), REGIONS.index("interior"))
+    region[np.concatenate(edges) | reference.silhouettes()] = REGIONS.index("silhouette")
+    return _Truth(views, reference, (angle * len(REGIONS) + region).astype(np.uint8), angles)
+
+
+def _elevation(scene: Scene, camera: Camera, pixels: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Angles of the view rays above the smooth surface, degrees."""
+    smooth = _shoot(scene, camera, _techniques.get("flat"), ("position", "normal"))
+    view = np.asarray(camera.eye) - smooth.aovs["position"][pixels].astype(np.float64)
     normal = smooth.aovs["normal"][pixels].astype(np.float64)
     lengths = np.linalg.norm(view, axis=1) * np.linalg.norm(normal, axis=1)
     sine = np.abs((view * normal).sum(axis=1)) / np.maximum(lengths, _NORMAL_AOV_FLOOR)
-    elevation = np.degrees(np.arcsin(np.clip(sine, 0.0, 1.0)))
-    groups = np.abs(elevation[:, None] - np.array(angles)[None, :]).argmin(axis=1).astype(np.uint8)
-    return _Truth(exact, pixels, reference, groups, angles)
+    elevation: NDArray[np.float64] = np.degrees(np.arcsin(np.clip(sine, 0.0, 1.0)))
+    return elevation
 
 
-Shown = tuple[NDArray[np.uint8], NDArray[np.float32]]
+def _outline(mesh: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Pixels of the mesh beside one that is none of it; the picture's border is no outline."""
+    padded = np.pad(mesh, 1, mode="edge")
+    inside = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
+    return mesh & ~inside
+
+
+Shown = tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.float32]]
 
 
 def _measure(
     scene: Scene, technique: Technique, truth: _Truth, has_flip: bool
 ) -> tuple[Shown, Row, list[tuple[float, Row]]]:
-    """The picture with its errors, the metrics of all pixels, and those of each elevation."""
-    frame = _shoot(scene, technique, _AOVS)
-    pixels, aovs = truth.pixels, frame.aovs
-    status = (aovs["mask"][pixels] <= 0.0).astype(np.uint8)
-    metrics, by_group, errors = truth.reference.measure(
-        np.ascontiguousarray(aovs["uv"][pixels]),
-        np.ascontiguousarray(aovs["height"][pixels]),
-        status,
-        truth.groups,
-        len(truth.angles),
-    )
+    """The first picture with its errors and steps, the metrics of all pixels, those of each elevation."""
+    frames = [_shoot(scene, view.camera, technique, _AOVS) for view in truth.views]
+
+    def gather(name: str) -> NDArray[np.float32]:
+        pairs = zip(truth.views, frames, strict=True)
+        return np.concatenate([frame.aovs[name][view.pixels] for view, frame in pairs])
+
+    uv, height = (np.ascontiguousarray(gather(name)) for name in ("uv", "height"))
+    status = (gather("mask") <= 0.0).astype(np.uint8)
+    parts = len(REGIONS)
+    sets: list[list[int]] = []
+    for at in range(len(truth.angles)):
+        sets += [[at * parts + region] for region in range(parts)]
+        sets.append([at * parts + region for region in range(parts)])
+    for region in range(parts):
+        sets.append([at * parts + region for at in range(len(truth.angles))])
+    metrics, found, errors = truth.reference.measure(uv, height, status, truth.groups, sets)
     shadows = scene.shadows and technique.casts_shadows
-    everything = np.ones(len(errors), bool)
-    _complete(metrics, frame, truth, everything, shadows)
-    metrics.update(_picture_metrics(truth.exact, frame, has_flip))
+    here = {name: gather(name) for name in ("normal", "shadow", "steps")}
+    there = {
+        name: np.concatenate([view.exact.aovs[name][view.pixels] for view in truth.views])
+        for name in ("normal", "shadow")
+    }
+    _complete(metrics, here, there, np.ones(truth.count, bool), shadows)
+    for part, chosen in zip(found, sets, strict=True):
+        _complete(part, here, there, np.isin(truth.groups, chosen), shadows)
+    metrics["regions"] = {
+        name: part for name, part in zip(REGIONS, found[-parts:], strict=True) if part["rays"]
+    }
     by_angle = []
-    for at, (angle, part) in enumerate(zip(truth.angles, by_group, strict=True)):
-        chosen = truth.groups == at
-        if chosen.any():
-            _complete(part, frame, truth, chosen, shadows)
-            by_angle.append((angle, part))
+    for at, angle in enumerate(truth.angles):
+        *regions, total = found[at * (parts + 1) : (at + 1) * (parts + 1)]
+        total["regions"] = {name: part for name, part in zip(REGIONS, regions, strict=True) if part["rays"]}
+        if total["rays"]:
+            by_angle.append((angle, total))
+    metrics.update(_picture_metrics([view.exact for view in truth.views], frames, has_flip))
+    pixels = truth.views[0].pixels
     texels = np.full(pixels.shape, np.nan, np.float32)
-    texels[pixels] = errors
-    return (np.ascontiguousarray(frame.color[:, :, :3]), texels), metrics, by_angle
+    texels[pixels] = errors[: int(pixels.sum())]
+    steps = np.where(frames[0].aovs["mask"] > 0.0, frames[0].aovs["steps"], np.float32(np.nan))
+    shown = (np.ascontiguousarray(frames[0].color[:, :, :3]), texels, steps.astype(np.float32))
+    return shown, metrics, by_angle
 
 
-def _complete(metrics: Row, frame: Frame, truth: _Truth, chosen: NDArray[np.bool_], shadows: bool) -> None:
+def _complete(
+    metrics: Row,
+    here: dict[str, NDArray[np.float32]],
+    there: dict[str, NDArray[np.float32]],
+    chosen: NDArray[np.bool_],
+    shadows: bool,
+) -> None:
     """Adds what only pictures tell: normals, shadows and steps, against those of the exact picture."""
-    pixels = truth.pixels
-    here, there = frame.aovs["normal"][pixels][chosen], truth.exact.aovs["normal"][pixels][chosen]
-    both = (np.linalg.norm(here, axis=1) > 0.5) & (np.linalg.norm(there, axis=1) > 0.5)
+    if not chosen.any():
+        return
+    ours, theirs = here["normal"][chosen], there["normal"][chosen]
+    both = (np.linalg.norm(ours, axis=1) > 0.5) & (np.linalg.norm(theirs, axis=1) > 0.5)
     if both.any():
-        angle = _angle_deg(here[both].astype(np.float64), there[both].astype(np.float64))
+        angle = _angle_deg(ours[both].astype(np.float64), theirs[both].astype(np.float64))
         metrics["normal_error_median_deg"] = float(np.median(angle))
         metrics["normal_error_p99_deg"] = float(np.quantile(angle, 0.99, method="inverted_cdf"))
     if shadows:
-        difference = np.abs(frame.aovs["shadow"][pixels][chosen] - truth.exact.aovs["shadow"][pixels][chosen])
+        difference = np.abs(here["shadow"][chosen] - there["shadow"][chosen])
         metrics["shadow_error_rate"] = float((difference > _SHADOW_TOLERANCE).mean())
-    metrics["steps_mean"] = float(frame.aovs["steps"][pixels][chosen].mean())
+    metrics["steps_mean"] = float(here["steps"][chosen].mean())
 
 
 def _angle_deg(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -219,17 +341,25 @@ def _angle_deg(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.flo
     return angles
 
 
-def _picture_metrics(exact: Frame, frame: Frame, has_flip: bool) -> dict[str, float | None]:
-    decibel = psnr(exact.color, frame.color)
-    equal = math.isinf(decibel)
+def _picture_metrics(exact: list[Frame], frames: list[Frame], has_flip: bool) -> dict[str, float | None]:
+    """Means over the cameras; the decibels are those of the mean squared error."""
+    pairs = [(right.color, here.color) for right, here in zip(exact, frames, strict=True)]
+    decibels = [psnr(right, here) for right, here in pairs]
+    noise = float(np.mean([10.0 ** (-0.1 * decibel) for decibel in decibels]))
+    flips = None
+    if has_flip:
+        flips = [
+            0.0 if math.isinf(decibel) else flip(right, here)[0]
+            for decibel, (right, here) in zip(decibels, pairs, strict=True)
+        ]
     return {
-        "flip_mean": None if not has_flip else 0.0 if equal else flip(exact.color, frame.color)[0],
-        "psnr_db": None if equal else decibel,
-        "ssim": ssim(exact.color, frame.color),
+        "flip_mean": None if flips is None else float(np.mean(flips)),
+        "psnr_db": None if noise == 0.0 else -10.0 * math.log10(noise),
+        "ssim": float(np.mean([ssim(right, here) for right, here in pairs])),
     }
 
 
-def _times(draw_ms: list[float], pixels: int) -> dict[str, Any]:
+def _times(draw_ms: list[float], pixels: int, cameras: int) -> dict[str, Any]:
     low, median, high = np.percentile(draw_ms, (25, 50, 75)) * 1e6 / pixels
     return {
         "time_cpu_ns_per_ray": None,
@@ -238,7 +368,7 @@ def _times(draw_ms: list[float], pixels: int) -> dict[str, Any]:
         "time_device_ns_per_ray": float(median),
         "time_device_ns_per_ray_low": float(low),
         "time_device_ns_per_ray_high": float(high),
-        "time_frame_ms": float(np.median(draw_ms)),
+        "time_frame_ms": float(np.median(draw_ms)) / cameras,
         "device_difference_p99_texels": None,
         "device_difference_hit_rate": None,
     }

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import csv
+import io
+import itertools
 import json
 import os
 import platform
@@ -19,16 +22,24 @@ from ._atomic import replace_file
 from ._checks import choice, flag, number, whole
 from .heightmap import HeightMap
 from .meshes import Mesh
+from .recommending import LEAST_CHECKED, MipAdvice, Recommendation, recommend, recommend_by_mip
 from .scene import Camera, Light, Material
 from .techniques import Technique
 
-__all__ = ["CompareResult", "Recommendation", "Scene", "compare"]
+__all__ = ["FORMATS", "CompareResult", "MipAdvice", "Recommendation", "Scene", "compare"]
 
 Device: TypeAlias = Literal["auto", "cpu", "gpu"]
 Progress: TypeAlias = Callable[[int, int, str], object]
 Row: TypeAlias = "dict[str, Any]"
 
+Region: TypeAlias = Literal["interior", "silhouette", "shadow"]
+_Settings: TypeAlias = "list[tuple[str, list[tuple[str, float]], str, str]]"
+
 ELEVATIONS = (90.0, 45.0, 20.0, 10.0, 5.0)
+#: Texture formats that height maps and cone maps may be stored in.
+FORMATS = ("r32float", "r16float", "r16unorm", "r8unorm")
+#: Parts of a relief that errors are split by.
+REGIONS: tuple[Region, ...] = ("interior", "silhouette", "shadow")
 #: A technique that gets more than this share of rays wrong altogether is neither recommended nor on
 #: the Pareto front.
 MAX_FAILURE_RATE = 1e-3
@@ -46,8 +57,8 @@ class Scene:
         The mesh.
     material : Material
         Its material, with a height map.
-    camera : Camera
-        Where it is seen from.
+    camera : Camera or sequence of Camera
+        Where it is seen from; several are a path, and all of their pixels count.
     lights : sequence of Light
         None at all is one directional light from the upper right.
     size : int or (int, int), default (512, 512)
@@ -58,7 +69,7 @@ class Scene:
 
     mesh: Mesh
     material: Material
-    camera: Camera
+    camera: Camera | Sequence[Camera]
     lights: Sequence[Light] = ()
     size: tuple[int, int] = (512, 512)
     shadows: bool = True
@@ -70,8 +81,11 @@ class Scene:
             raise TypeError(f"material must be a Material, got {type(self.material).__name__}")
         if self.material.height is None:
             raise ValueError("the material has no height map: there is nothing to compare")
-        if not isinstance(self.camera, Camera):
-            raise TypeError(f"camera must be a Camera, got {type(self.camera).__name__}")
+        for camera in self.cameras:
+            if not isinstance(camera, Camera):
+                raise TypeError(f"camera must be a Camera or several, got {type(camera).__name__}")
+        if not self.cameras:
+            raise ValueError("the camera path is empty")
         lights = (self.lights,) if isinstance(self.lights, Light) else tuple(self.lights)
         for light in lights:
             if not isinstance(light, Light):
@@ -80,48 +94,32 @@ class Scene:
         object.__setattr__(self, "size", _size(self.size))
         flag("shadows", self.shadows)
 
-
-@dataclass(frozen=True)
-class Recommendation:
-    """What to use, and why; or why nothing qualifies.
-
-    Attributes
-    ----------
-    technique : str or None
-        Name of the technique, None when nothing is within the budget.
-    parameters : dict of str to int
-        Its parameters.
-    error_p99_texels : float or None
-        The bound it was measured at: 99th percentile of the hit-uv error in texels.
-    failure_rate : float or None
-        Measured share of rays without a right hit, 0..1.
-    time_ns_per_ray : float or None
-        Median time.
-    reason : str
-        One or two sentences.
-    """
-
-    technique: str | None
-    parameters: dict[str, int]
-    error_p99_texels: float | None
-    failure_rate: float | None
-    time_ns_per_ray: float | None
-    reason: str
-
-    def __bool__(self) -> bool:
-        return self.technique is not None
-
-    def __str__(self) -> str:
-        return self.reason if self.technique is not None else f"No recommendation. {self.reason}"
+    @property
+    def cameras(self) -> tuple[Camera, ...]:
+        """The camera path; one camera is a path of one."""
+        return tuple(self.camera) if isinstance(self.camera, Sequence) else (self.camera,)
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture a technique made: `rgb` (H, W, 3) uint8 sRGB, `error_texels` (H, W), NaN without a hit."""
+    """A picture a technique made.
+
+    Attributes
+    ----------
+    label : str
+        The setting.
+    rgb : (H, W, 3) uint8
+        sRGB.
+    error_texels : (H, W) float32
+        Distance of the hit from the exact one, NaN without a hit.
+    steps : (H, W) float32
+        Height reads of the view ray; NaN where there is no mesh.
+    """
 
     label: str
     rgb: NDArray[np.uint8]
     error_texels: NDArray[np.float32]
+    steps: NDArray[np.float32]
 
 
 def label(technique: str, parameters: dict[str, int]) -> str:
@@ -139,16 +137,21 @@ class CompareResult:
     rows : list of dict
         One for each technique and elevation (degrees), and one with ``elevation="all"``:
 
-        ``technique``, ``parameters``, ``label``, ``elevation``, ``rays``;
+        ``technique``, ``parameters``, ``label``, ``elevation``, ``rays``; ``heights_format``,
+        ``cones_format`` (None where none are read), ``memory_bytes`` (texture that it reads);
         ``time_cpu_ns_per_ray`` and ``time_device_ns_per_ray`` (median, with ``_low`` and ``_high``
         quartiles; CPU on all cores; None where not measured);
-        ``uv_error_median_texels``, ``uv_error_p99_texels``, ``uv_error_max_texels``,
-        ``share_above_1_texel``; ``depth_error_p99``, ``depth_error_max`` (heights 0..1);
-        ``normal_error_median_deg``, ``normal_error_p99_deg``;
-        ``miss_rate`` (first hit skipped), ``false_hit_rate`` (hit reported above the surface),
-        ``unconverged_rate``, ``nan_count``, ``failure_rate`` (missed, unconverged or NaN);
+        ``uv_error_median_texels``, ``uv_error_p99_texels``, ``uv_error_p99_bound_texels`` (what the 99th
+        percentile of all such rays does not exceed, with 95 % confidence; None for under 299 rays),
+        ``uv_error_max_texels``, ``share_above_1_texel``; ``depth_error_p99``, ``depth_error_max``
+        (heights 0..1); ``normal_error_median_deg``, ``normal_error_p99_deg``;
+        ``miss_rate`` (first hit skipped), ``false_hit_rate`` (hit reported in the air),
+        ``unconverged_rate``, ``nan_count``, ``failure_rate`` (all of these), ``failure_rate_bound`` (with
+        95 % confidence);
         ``shadow_error_rate`` (None for techniques without shadows); ``steps_mean``;
-        ``device_difference_p99_texels``, ``device_difference_hit_rate`` (device against CPU).
+        ``device_difference_p99_texels``, ``device_difference_hit_rate`` (device against CPU);
+        ``regions``: the errors again for "interior", "silhouette" (beside an edge that hides relief, or
+        of the mesh) and "shadow" (not lit), where there are such rays.
 
         For scenes a ray is a pixel, the time is that of the whole frame over the pixels of the mesh,
         and the "all" rows also have ``flip_mean``, ``psnr_db``, ``ssim`` of the picture against the
@@ -157,6 +160,10 @@ class CompareResult:
         What was compared.
     environment : dict
         Device, driver, versions, settings.
+    dropped : list of dict
+        Settings that the adaptive sweep left out after a first look, because another one was faster
+        *and* more accurate by far: ``label``, ``time_ns_per_ray``, ``uv_error_p99_texels``,
+        ``failure_rate`` of that look.
     """
 
     rows: list[Row]
@@ -164,6 +171,8 @@ class CompareResult:
     environment: dict[str, Any]
     _source: HeightMap | Scene = field(repr=False)
     _pictures: list[Picture] = field(default_factory=list, repr=False)
+    dropped: list[Row] = field(default_factory=list)
+    _checked: dict[Any, Row] = field(default_factory=dict, repr=False)
 
     @property
     def elevations(self) -> list[Any]:
@@ -236,22 +245,35 @@ class CompareResult:
         self,
         max_error: float = 0.5,
         *,
+        max_time: float | None = None,
+        memory: int | None = None,
         max_failure_rate: float = MAX_FAILURE_RATE,
         elevation: float | str = "all",
         time: Literal["cpu", "device"] | None = None,
+        among: Iterable[str] | None = None,
+        verify: bool = True,
     ) -> Recommendation:
-        """The cheapest setting within an error budget.
+        """The cheapest setting within a budget, checked on rays that it was not chosen by.
 
         Parameters
         ----------
         max_error : float, default 0.5
             Largest 99th percentile of the hit-uv error, texels.
+        max_time : float or None
+            Longest time, nanoseconds a ray.
+        memory : int or None
+            Most texture that it may read, bytes.
         max_failure_rate : float, default 0.001
             Largest share of rays without a right hit.
         elevation : float or "all"
             Which rows count.
         time : {"cpu", "device"} or None
             Whose time counts; None for the device's where there is one.
+        among : iterable of str or None
+            Techniques that may be chosen, such as ``bumpwgpu.engines.BUILT_IN["godot"]``; None for all.
+        verify : bool, default True
+            Measure the pick again: on other rays and at angles between, or from cameras a little aside.
+            One whose error could exceed the budget there is passed over for the next.
 
         Returns
         -------
@@ -264,29 +286,98 @@ class CompareResult:
             A budget out of range, no such elevation, or no such time was measured.
         """
         rows, measured = self._measured(elevation, time)
-        budget = number("max_error", max_error, 0.0)
+        budget = (
+            number("max_error", max_error, 0.0),
+            number("max_failure_rate", max_failure_rate, 0.0, 1.0),
+            float("inf") if max_time is None else number("max_time", max_time, 0.0),
+            float("inf") if memory is None else number("memory", memory, 0.0),
+        )
+        flag("verify", verify)
+        if among is not None:
+            names = {_techniques.get(name).name for name in ([among] if isinstance(among, str) else among)}
+            chosen = [at for at, row in enumerate(rows) if row["technique"] in names]
+            rows, measured = [rows[at] for at in chosen], [measured[at] for at in chosen]
+        return recommend(self, rows, measured, budget, elevation, verify)
+
+    def recommend_by_mip(
+        self,
+        max_error: float = 0.5,
+        *,
+        levels: int = 4,
+        progress: Progress | None = None,
+        **options: Any,
+    ) -> list[MipAdvice]:
+        """What to use at a distance, where smaller mip levels of the height map are read.
+
+        Each level is compared like a map of its own, against its own exact surface; settings are those
+        of this comparison.
+
+        Parameters
+        ----------
+        max_error : float, default 0.5
+            Largest 99th percentile of the hit-uv error, in texels of the level.
+        levels : int, default 4
+            How many levels, 1 to 16; fewer where the map ends before.
+        progress : callable or None
+            Called as ``progress(done, total, text)``.
+        **options
+            What else :meth:`recommend` takes.
+
+        Returns
+        -------
+        list of MipAdvice
+            Level 0 first; ``advice.distance(fov_y, pixels)`` says from how far away it counts.
+
+        Raises
+        ------
+        ValueError
+            A scene was compared, or what :meth:`recommend` raises.
+        """
+        count = whole("levels", levels, 1, 16)
+        return recommend_by_mip(self, max_error, count, progress, options)
+
+    def exceeding(self, max_error: float, *, max_failure_rate: float = MAX_FAILURE_RATE) -> list[Row]:
+        """The rows over all elevations that exceed a limit: what a check in CI fails on.
+
+        Parameters
+        ----------
+        max_error : float
+            Largest 99th percentile of the hit-uv error, texels.
+        max_failure_rate : float, default 0.001
+            Largest share of rays without a right hit.
+
+        Returns
+        -------
+        list of dict
+
+        Raises
+        ------
+        ValueError, TypeError
+            A limit out of range or of the wrong kind.
+        """
+        limit = number("max_error", max_error, 0.0)
         allowed = number("max_failure_rate", max_failure_rate, 0.0, 1.0)
-        at, reason = _bumpwgpu.compare_recommend(measured, budget, allowed)
-        if at is None:
-            return Recommendation(None, {}, None, None, None, reason)
-        row = rows[at]
-        worst = max(
-            (other for other in self.rows if other["label"] == row["label"]),
-            key=lambda other: other["uv_error_p99_texels"],
-        )
-        if elevation == "all" and worst["uv_error_p99_texels"] > row["uv_error_p99_texels"]:
-            texels = worst["uv_error_p99_texels"]
-            reason += (
-                f" At its worst angle, {worst['elevation']:g} degrees, the p99 error is {texels:.3g} texels."
-            )
-        return Recommendation(
-            row["technique"],
-            dict(row["parameters"]),
-            row["uv_error_p99_texels"],
-            row["failure_rate"],
-            measured[at][1][1],
-            reason,
-        )
+        return [
+            row
+            for row in self.select("all")
+            if not (row["uv_error_p99_texels"] <= limit and row["failure_rate"] <= allowed)
+        ]
+
+    def _height_map(self) -> HeightMap | None:
+        return self._source if isinstance(self._source, HeightMap) else self._source.material.height
+
+    def _verified(self, row: Row, elevation: float | str) -> Row:
+        """Metrics of a setting on rays that it was not chosen by."""
+        key = (row["label"], elevation)
+        if key not in self._checked:
+            angles = [known for known in self.elevations if known != "all"]
+            if isinstance(self._source, Scene):
+                from ._compare_scene import verify_scene
+
+                self._checked[key] = verify_scene(self._source, row, angles, elevation)
+            else:
+                self._checked[key] = _verify_planar(self, self._source, row, angles, elevation)
+        return self._checked[key]
 
     def _measured(self, elevation: float | str, time: str | None) -> tuple[list[Row], list[Any]]:
         """Rows of one elevation, and what the ranking needs of each."""
@@ -297,7 +388,13 @@ class CompareResult:
             other = "cpu" if clock == "device" else "device"
             raise ValueError(f"no {clock} time was measured; use time={other!r}")
         return rows, [
-            (row["label"], [row[key] for key in keys], row["uv_error_p99_texels"], row["failure_rate"])
+            (
+                row["label"],
+                [row[key] for key in keys],
+                row["uv_error_p99_texels"],
+                row["failure_rate"],
+                float(row["memory_bytes"]),
+            )
             for row in rows
         ]
 
@@ -319,21 +416,44 @@ class CompareResult:
             The folder does not exist.
         """
         advice = self.recommend()
+        front = self.pareto()
         data = {
             "kind": self.kind,
             "environment": self.environment,
             "timed_on": self.timed_on,
             "rows": self.rows,
-            "pareto": [row["label"] for row in self.pareto()],
-            "recommendation": {
-                "technique": advice.technique,
-                "parameters": advice.parameters,
-                "error_p99_texels": advice.error_p99_texels,
-                "reason": advice.reason,
-            },
+            "dropped": self.dropped,
+            "pareto": [row["label"] for row in front],
+            "ties": {row["label"]: row["tied_with"] for row in front if row["tied_with"]},
+            "recommendation": advice_dict(advice),
         }
         text = json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False)
         return replace_file(path, text.encode())
+
+    def to_csv(self, path: str | os.PathLike[str]) -> Path:
+        """Write all rows as CSV: one column for each figure, those of regions with the region in front.
+
+        Parameters
+        ----------
+        path : path
+            The file; replaced whole or not at all.
+
+        Returns
+        -------
+        Path
+
+        Raises
+        ------
+        FileNotFoundError
+            The folder does not exist.
+        """
+        flat = [_flat(row) for row in self.rows]
+        columns = list(dict.fromkeys(name for row in flat for name in row))
+        buffer = io.StringIO()
+        writer = csv.DictWriter(buffer, columns, restval="", lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(flat)
+        return replace_file(path, buffer.getvalue().encode())
 
     def plot(self, path: str | os.PathLike[str]) -> Path:
         """Plot time against error, one panel for each elevation. Needs matplotlib.
@@ -401,7 +521,10 @@ class CompareResult:
         seen: set[str] = set()
         shown = []
         for row in rows:
-            if row["technique"] != "exact" and (row["technique"] not in seen or row["label"] in front):
+            plain = row["heights_format"] == FORMATS[0] and row["cones_format"] in (None, FORMATS[0])
+            if not plain or row["technique"] == "exact":
+                continue
+            if row["technique"] not in seen or row["label"] in front:
                 shown.append(row)
             seen.add(row["technique"])
         return shown
@@ -416,6 +539,7 @@ def compare(
     techniques: str | Technique | Iterable[str | Technique] | None = None,
     *,
     elevations: Iterable[float] = ELEVATIONS,
+    formats: Iterable[str] | None = None,
     device: Device = "auto",
     rays: int = 8192,
     repeats: int = 5,
@@ -432,11 +556,17 @@ def compare(
     source : HeightMap or Scene
         What to compare on.
     techniques : name, Technique, or several; None
-        Which settings. None tries every technique with its defaults and, on a height map, a grid of
-        step counts.
+        Which settings. None is every technique with its defaults and, on a height map, an adaptive
+        sweep: each over its own parameters, more of them around the Pareto front, there with smaller
+        texture formats too; what another setting beats by far gets no more than a first look (see
+        ``CompareResult.dropped``). "relaxed_cone_texel", whose map takes long to bake, has to be named.
     elevations : iterable of float, default (90, 45, 20, 10, 5)
         View angles above the surface in degrees, in mesh units, above 0 to 90. The pixels of a scene
         are counted with the nearest of them.
+    formats : iterable of str or None
+        Texture formats to try each of the techniques with: "r32float", "r16float", "r16unorm",
+        "r8unorm". Heights are rounded to the nearest value, cone ratios down. Errors are against the
+        map as it is; times are those of 32-bit floats. None is 32-bit floats for named techniques.
     device : {"auto", "cpu", "gpu"}
         Whose time to take besides the CPU's. "auto" takes a Vulkan device if there is one. Scenes need
         one.
@@ -465,8 +595,11 @@ def compare(
     Notes
     -----
     A *miss* is a ray whose first hit was skipped: it went below the surface by more than 1e-4 of the
-    relief and came up again before the reported hit. A *false hit* was reported more than 1 % of the
-    relief above the surface and short of the true one.
+    relief and came up again before the reported hit. A *false hit* was reported in the air: more than 1 %
+    of the relief above the surface and more than a texel short of the true one. Either is no answer at
+    all, so a setting with more than 0.1 % of them is neither on the front nor recommended.
+
+    Times whose quartiles meet, or whose medians differ by less than 5 %, are a tie.
 
     Examples
     --------
@@ -487,6 +620,8 @@ def compare(
     if isinstance(source, Scene):
         from ._compare_scene import compare_scene
 
+        if formats is not None:
+            raise ValueError("formats are tried on height maps; a scene is drawn with 32-bit floats")
         return compare_scene(source, chosen, angles, device, rounds, progress)
     if not isinstance(source, HeightMap):
         raise TypeError(f"compare takes a HeightMap or a Scene, got {type(source).__name__}")
@@ -494,12 +629,11 @@ def compare(
         if not technique.marches:
             known = ", ".join(_techniques.marching())
             raise ValueError(f"technique {technique.name!r} finds no hit on a height map; these do: {known}")
-    settings = [(technique.name, list(technique.parameters.items())) for technique in chosen]
-    rows, problem = _bumpwgpu.compare_planar(
+    settings = _settings(chosen, formats)
+    rows, dropped, problem = _bumpwgpu.compare_planar(
         source._field, settings, angles, count, rounds, start, device, progress
     )
     for row in rows:
-        row["label"] = label(row["technique"], row["parameters"])
         row["elevation"] = "all" if row["elevation"] is None else row["elevation"]
     environment = {
         **machine(device != "cpu" and problem is None),
@@ -510,7 +644,70 @@ def compare(
     }
     if problem is not None:
         environment["device"] = f"none ({problem})"
-    return CompareResult(rows, "planar", environment, source)
+    return CompareResult(rows, "planar", environment, source, dropped=dropped)
+
+
+def _settings(chosen: list[Technique], formats: Any) -> _Settings:
+    """Techniques with formats; none for the adaptive sweep."""
+    if formats is None:
+        wanted = [FORMATS[0]]
+    else:
+        wanted = [formats] if isinstance(formats, str) else list(formats)
+        for name in wanted:
+            choice("formats", name, FORMATS)
+        if not wanted:
+            raise ValueError("formats is empty; at least one is needed, or None")
+        if not chosen:
+            raise ValueError("formats go with named techniques: the adaptive sweep tries them by itself")
+    settings: _Settings = []
+    for technique in chosen:
+        values = [(name, float(value)) for name, value in technique.parameters.items()]
+        settings += [(technique.name, values, name, name) for name in dict.fromkeys(wanted)]
+    return settings
+
+
+def _verify_planar(
+    result: CompareResult, source: HeightMap, row: Row, angles: list[float], elevation: float | str
+) -> Row:
+    """Metrics on other rays, and at the angles between those that were measured."""
+    if elevation != "all":
+        angles = [float(elevation)]
+    between = [0.5 * (high + low) for high, low in itertools.pairwise(sorted(angles, reverse=True))]
+    checked = sorted({*angles, *between}, reverse=True)
+    count = max(result.environment["rays_per_elevation"], -(-LEAST_CHECKED // len(checked)))
+    setting = (
+        row["technique"],
+        [(name, float(value)) for name, value in row["parameters"].items()],
+        row["heights_format"],
+        row["cones_format"] or FORMATS[0],
+    )
+    seed = (result.environment["seed"] + 0x5EED) % (1 << 64)
+    return _bumpwgpu.compare_verify(source._field, setting, checked, min(count, 1 << 20), seed)
+
+
+def advice_dict(advice: Recommendation) -> dict[str, Any]:
+    """A recommendation as JSON holds it."""
+    return {
+        "technique": advice.technique,
+        "parameters": advice.parameters,
+        "heights_format": advice.heights_format,
+        "cones_format": advice.cones_format,
+        "error_p99_texels": advice.error_p99_texels,
+        "bound_p99_texels": advice.bound_p99_texels,
+        "bound_failure_rate": advice.bound_failure_rate,
+        "verified_rays": advice.verified_rays,
+        "time_ns_per_ray": advice.time_ns_per_ray,
+        "memory_bytes": advice.memory_bytes,
+        "reason": advice.reason,
+    }
+
+
+def _flat(row: Row) -> Row:
+    flat = {name: value for name, value in row.items() if name not in ("regions", "parameters")}
+    flat["parameters"] = " ".join(f"{name}={value}" for name, value in row["parameters"].items())
+    for region, part in row["regions"].items():
+        flat.update({f"{region}_{name}": value for name, value in part.items()})
+    return flat
 
 
 def _size(size: Any) -> tuple[int, int]:
@@ -580,6 +777,5 @@ def _planar_pictures(height_map: HeightMap, rows: list[Row]) -> list[Picture]:
     view = _bumpwgpu.CompareView(height_map._field, *PICTURE_SIZE)
     made = [Picture("exact", *view.picture("exact", []))]
     for row in rows:
-        rgb, error = view.picture(row["technique"], list(row["parameters"].items()))
-        made.append(Picture(row["label"], rgb, error))
+        made.append(Picture(row["label"], *view.picture(row["technique"], list(row["parameters"].items()))))
     return made

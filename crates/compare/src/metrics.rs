@@ -6,22 +6,28 @@
 //! * **miss**: the true first hit was skipped. The ray went below the surface by more than
 //!   [`DIVE_DEPTH`](crate::dive::DIVE_DEPTH) and came up again before the reported hit, or nothing was
 //!   reported. A hit that is merely late but in the same dive is no miss; its uv error says how late.
-//! * **false hit**: reported short of the true one while the ray was above the surface by more than
-//!   [`FALSE_HIT_GAP`].
+//! * **false hit**: reported in the air: short of the true one by more than [`FALSE_HIT_TEXELS`], where
+//!   the ray was above the surface by more than [`FALSE_HIT_GAP`].
 //! * **unconverged**: the search gave up.
 //!
 //! uv, depth and normal statistics are over rays with a reported hit; misses, gaps and the rest are
-//! over all rays that truly hit.
+//! over all rays that truly hit. Each ray also knows the [`Region`] of the relief that its true hit lies in.
 
 use heightfield::{HeightField, Status, Wrap};
 use rayon::prelude::*;
 
 use crate::dive::end_of_first_dive;
+use crate::region::Region;
+use crate::statistics::{percentile, percentile_bound, share_bound};
 use crate::{CompareError, Rays, Reference, reference};
 
 /// Height above the surface (0..1) from which a hit short of the true one is a false hit: 1 % of the
 /// relief. Nearer ones are the usual imprecision of a search and show as uv error.
 pub const FALSE_HIT_GAP: f64 = 0.01;
+
+/// Texels short of the true hit from which a hit in the air is a false one: beside a steep wall a small
+/// part of a texel is a large part of the relief.
+pub const FALSE_HIT_TEXELS: f64 = 1.0;
 
 /// Slack when a reported `t` is held against the end of the dive, relative to `t`: some `f32` steps.
 const T_SLACK: f64 = 1.0e-6;
@@ -69,10 +75,13 @@ pub struct RayErrors {
     pub normal_deg: Vec<f32>,
     /// What became of the ray.
     pub outcome: Vec<Outcome>,
+    /// Where the true hit lies.
+    pub region: Vec<Region>,
     /// Height reads; 0 without.
     pub steps: Vec<u32>,
-    /// Shadow rays tested and how many of them came out wrong, if the technique casts shadows.
-    pub shadows: Option<(usize, usize)>,
+    /// By [`Region`], shadow rays tested and how many of them came out wrong, if the technique casts
+    /// shadows.
+    pub shadows: Option<[(usize, usize); Region::ALL.len()]>,
 }
 
 impl RayErrors {
@@ -99,6 +108,7 @@ impl RayErrors {
             errors.depth.push(row.depth as f32);
             errors.normal_deg.push(row.normal_deg as f32);
             errors.outcome.push(row.outcome);
+            errors.region.push(reference.regions[i]);
             errors.steps.push(reported.steps.map_or(0, |steps| steps[i]));
         }
         Ok(errors)
@@ -112,6 +122,7 @@ impl RayErrors {
             part.depth.push(self.depth[i]);
             part.normal_deg.push(self.normal_deg[i]);
             part.outcome.push(self.outcome[i]);
+            part.region.push(self.region[i]);
             part.steps.push(self.steps[i]);
         }
         part
@@ -175,17 +186,21 @@ fn measure_ray(
     let off: [f64; 2] = std::array::from_fn(|axis| {
         (same_tile(field.wrap(), uv[axis], at[axis]) - truth.uv[axis]) * size[axis]
     });
+    let uv_texels = off[0].hypot(off[1]);
     let slack = T_SLACK * truth.t.abs().max(t.abs());
     let skipped = |t_hit| end_of_first_dive(field, origin, direction, t_hit, t) < t - slack;
     let outcome = if t > truth.t + slack && skipped(truth.t) {
         Outcome::Missed
-    } else if t < truth.t && at[2] - field.height_at(at[0], at[1]) > FALSE_HIT_GAP {
+    } else if t < truth.t
+        && uv_texels > FALSE_HIT_TEXELS
+        && at[2] - field.height_at(at[0], at[1]) > FALSE_HIT_GAP
+    {
         Outcome::FalseHit
     } else {
         Outcome::Found
     };
     RayRow {
-        uv_texels: off[0].hypot(off[1]),
+        uv_texels,
         depth: (z - truth.z).abs(),
         normal_deg: normal.map_or(f64::NAN, |[x, y, z]| {
             angle_deg(reference::normal(field.extent(), [-x / z, -y / z]), truth.normal)
@@ -219,6 +234,9 @@ pub struct Metrics {
     pub uv_error_median_texels: f64,
     /// 99th percentile.
     pub uv_error_p99_texels: f64,
+    /// What the 99th percentile of all rays of this kind does not exceed, with 95 % confidence; `None` for
+    /// too few rays to tell.
+    pub uv_error_p99_bound_texels: Option<f64>,
     /// Largest.
     pub uv_error_max_texels: f64,
     /// Share of rays more than a texel off; rays without a hit count as such.
@@ -248,53 +266,72 @@ pub struct Metrics {
 impl Metrics {
     /// Sums up one or several sets of rays as if they were one.
     pub fn of(parts: &[&RayErrors]) -> Self {
+        Self::over(parts, None)
+    }
+
+    /// The same for the rays that truly hit in one region.
+    pub fn of_region(parts: &[&RayErrors], region: Region) -> Self {
+        Self::over(parts, Some(region))
+    }
+
+    fn over(parts: &[&RayErrors], wanted: Option<Region>) -> Self {
+        let counts = |part: &RayErrors, i: usize| wanted.is_none_or(|wanted| part.region[i] == wanted);
         let all = |pick: fn(&RayErrors) -> &Vec<f32>| -> Vec<f32> {
-            parts.iter().flat_map(|part| pick(part).iter().copied()).filter(|x| !x.is_nan()).collect()
+            parts
+                .iter()
+                .flat_map(|&part| pick(part).iter().enumerate().filter(move |(i, _)| counts(part, *i)))
+                .map(|(_, &x)| x)
+                .filter(|x| !x.is_nan())
+                .collect()
         };
-        let outcomes: Vec<Outcome> = parts.iter().flat_map(|part| part.outcome.iter().copied()).collect();
-        let rays = outcomes.len();
-        let count = |which: Outcome| outcomes.iter().filter(|&&o| o == which).count();
+        let mut outcomes = [0_usize; 5];
+        let mut steps = 0_u64;
+        for part in parts {
+            for i in (0..part.outcome.len()).filter(|&i| counts(part, i)) {
+                outcomes[part.outcome[i] as usize] += 1;
+                steps += u64::from(part.steps[i]);
+            }
+        }
+        let rays: usize = outcomes.iter().sum();
         let share = |n: usize| if rays == 0 { 0.0 } else { n as f64 / rays as f64 };
+        let rate = |which: Outcome| share(outcomes[which as usize]);
         let mut uv = all(|part| &part.uv_texels);
         let mut depth = all(|part| &part.depth);
         let mut angle = all(|part| &part.normal_deg);
         let above = uv.iter().filter(|&&e| e > 1.0).count() + rays - uv.len();
-        let steps: u64 = parts.iter().flat_map(|part| &part.steps).map(|&s| u64::from(s)).sum();
-        let shadows: Option<(usize, usize)> = parts
-            .iter()
-            .map(|part| part.shadows)
-            .try_fold((0, 0), |(n, wrong), part| part.map(|(m, w)| (n + m, wrong + w)));
+        let regions = wanted.map_or(0..Region::ALL.len(), |region| region as usize..region as usize + 1);
+        let shadows: Option<(usize, usize)> = parts.iter().try_fold((0, 0), |sum, part| {
+            let tested = part.shadows.as_ref()?;
+            Some(tested[regions.clone()].iter().fold(sum, |(n, wrong), (m, w)| (n + m, wrong + w)))
+        });
         Self {
             rays,
             uv_error_median_texels: percentile(&mut uv, 0.5),
             uv_error_p99_texels: percentile(&mut uv, 0.99),
+            uv_error_p99_bound_texels: percentile_bound(&mut uv, 0.99),
             uv_error_max_texels: percentile(&mut uv, 1.0),
             share_above_1_texel: share(above),
             depth_error_p99: percentile(&mut depth, 0.99),
             depth_error_max: percentile(&mut depth, 1.0),
             normal_error_median_deg: (!angle.is_empty()).then(|| percentile(&mut angle, 0.5)),
             normal_error_p99_deg: (!angle.is_empty()).then(|| percentile(&mut angle, 0.99)),
-            miss_rate: share(count(Outcome::Missed)),
-            false_hit_rate: share(count(Outcome::FalseHit)),
-            unconverged_rate: share(count(Outcome::Unconverged)),
-            nan_count: count(Outcome::NotFinite),
+            miss_rate: rate(Outcome::Missed),
+            false_hit_rate: rate(Outcome::FalseHit),
+            unconverged_rate: rate(Outcome::Unconverged),
+            nan_count: outcomes[Outcome::NotFinite as usize],
             shadow_error_rate: shadows.map(|(n, wrong)| if n == 0 { 0.0 } else { wrong as f64 / n as f64 }),
             steps_mean: if rays == 0 { 0.0 } else { steps as f64 / rays as f64 },
         }
     }
 
-    /// Share of rays that have no right hit at all: missed, given up or not finite.
+    /// Share of rays that have no right hit at all: missed, in the air, given up or not finite.
     pub fn failure_rate(&self) -> f64 {
         let nan = if self.rays == 0 { 0.0 } else { self.nan_count as f64 / self.rays as f64 };
-        self.miss_rate + self.unconverged_rate + nan
+        self.miss_rate + self.false_hit_rate + self.unconverged_rate + nan
     }
-}
 
-/// Nearest-rank percentile, `rank` in 0..1; 0 for no values. Reorders the values.
-pub fn percentile(values: &mut [f32], rank: f64) -> f64 {
-    if values.is_empty() {
-        return 0.0;
+    /// What the failure rate of all rays of this kind does not exceed, with 95 % confidence.
+    pub fn failure_rate_bound(&self) -> f64 {
+        share_bound(self.failure_rate(), self.rays)
     }
-    let at = ((rank * values.len() as f64).ceil() as usize).clamp(1, values.len()) - 1;
-    f64::from(*values.select_nth_unstable_by(at, f32::total_cmp).1)
 }

@@ -33,6 +33,8 @@ pub struct Picture {
     /// Distance of the hit from the exact one in texels at each pixel's centre; NaN where nothing was
     /// reported.
     pub error_texels: Vec<f32>,
+    /// Height reads of the ray through each pixel's centre.
+    pub steps: Vec<f32>,
 }
 
 /// The view of a map, with the exact answers of its pixels, shared by the pictures of all techniques.
@@ -75,7 +77,8 @@ impl View {
         for (i, error) in measured.zip(errors.uv_texels) {
             error_texels[i] = error;
         }
-        Ok(Picture { size: self.size, rgb: self.shade(field, technique)?, error_texels })
+        let steps = hits.steps.unwrap_or_default().into_iter().map(|steps| steps as f32).collect();
+        Ok(Picture { size: self.size, rgb: self.shade(field, technique)?, error_texels, steps })
     }
 
     fn shade(&self, field: &HeightField, technique: &Technique) -> Result<Vec<u8>, CompareError> {

@@ -13,6 +13,8 @@ pub struct Entry {
     pub error_texels: f64,
     /// Share of rays without a right hit, 0..1.
     pub failure_rate: f64,
+    /// Bytes of texture that it reads.
+    pub memory_bytes: f64,
 }
 
 /// What is acceptable.
@@ -22,6 +24,38 @@ pub struct Budget {
     pub max_error_texels: f64,
     /// Largest share of rays without a right hit, 0..1.
     pub max_failure_rate: f64,
+    /// Longest time a ray, nanoseconds.
+    pub max_time_ns: f64,
+    /// Most bytes of texture.
+    pub max_memory_bytes: f64,
+}
+
+impl Budget {
+    /// Limits of accuracy alone.
+    pub fn of_errors(max_error_texels: f64, max_failure_rate: f64) -> Self {
+        Self {
+            max_error_texels,
+            max_failure_rate,
+            max_time_ns: f64::INFINITY,
+            max_memory_bytes: f64::INFINITY,
+        }
+    }
+
+    fn affords(&self, entry: &Entry) -> bool {
+        entry.time.median_ns <= self.max_time_ns && entry.memory_bytes <= self.max_memory_bytes
+    }
+
+    /// The limits beside those of accuracy, as part of a sentence.
+    fn limits(&self) -> String {
+        let mut text = String::new();
+        if self.max_time_ns.is_finite() {
+            text.push_str(&format!(", at most {} ns a ray", digits(self.max_time_ns)));
+        }
+        if self.max_memory_bytes.is_finite() {
+            text.push_str(&format!(", at most {} KiB of texture", digits(self.max_memory_bytes / 1024.0)));
+        }
+        text
+    }
 }
 
 /// What to use.
@@ -36,14 +70,15 @@ pub struct Advice {
 /// Picks the cheapest entry within the budget. Among those that time cannot tell apart from the
 /// cheapest, the most accurate wins.
 pub fn recommend(entries: &[Entry], budget: &Budget) -> Advice {
+    let affordable: Vec<usize> = (0..entries.len()).filter(|&i| budget.affords(&entries[i])).collect();
     let reliable: Vec<usize> =
-        (0..entries.len()).filter(|&i| entries[i].failure_rate <= budget.max_failure_rate).collect();
+        affordable.iter().copied().filter(|&i| entries[i].failure_rate <= budget.max_failure_rate).collect();
     let within: Vec<usize> =
         reliable.iter().copied().filter(|&i| entries[i].error_texels <= budget.max_error_texels).collect();
     let by_time =
         |a: &&usize, b: &&usize| entries[**a].time.median_ns.total_cmp(&entries[**b].time.median_ns);
     let Some(&fastest) = within.iter().min_by(by_time) else {
-        return Advice { pick: None, reason: why_none(entries, &reliable, budget) };
+        return Advice { pick: None, reason: why_none(entries, &affordable, &reliable, budget) };
     };
     let rivals: Vec<usize> =
         within.iter().copied().filter(|&i| !entries[fastest].time.clearly_faster(&entries[i].time)).collect();
@@ -59,12 +94,13 @@ pub fn recommend(entries: &[Entry], budget: &Budget) -> Advice {
         format!("the least of the {} settings", within.len())
     };
     let mut reason = format!(
-        "{} takes {} ns a ray, {rank} with a p99 error of at most {} texels and at most {} of rays failing; \
+        "{} takes {} ns a ray, {rank} with a p99 error of at most {} texels and at most {} of rays failing{}; \
          measured: {} texels, {} failing.",
         chosen.label,
         digits(chosen.time.median_ns),
         digits(budget.max_error_texels),
         percent(budget.max_failure_rate),
+        budget.limits(),
         digits(chosen.error_texels),
         percent(chosen.failure_rate),
     );
@@ -80,27 +116,43 @@ pub fn recommend(entries: &[Entry], budget: &Budget) -> Advice {
     Advice { pick: Some(pick), reason }
 }
 
-fn why_none(entries: &[Entry], reliable: &[usize], budget: &Budget) -> String {
+fn why_none(entries: &[Entry], affordable: &[usize], reliable: &[usize], budget: &Budget) -> String {
     if entries.is_empty() {
         return "Nothing was measured.".to_owned();
     }
     let least = |indices: &[usize], key: fn(&Entry) -> f64| {
         indices.iter().copied().min_by(|&a, &b| key(&entries[a]).total_cmp(&key(&entries[b])))
     };
+    if affordable.is_empty()
+        && let (Some(fastest), Some(smallest)) = {
+            let all: Vec<usize> = (0..entries.len()).collect();
+            (least(&all, |e| e.time.median_ns), least(&all, |e| e.memory_bytes))
+        }
+    {
+        return format!(
+            "No setting is within the limits{}; the fastest, {}, takes {} ns a ray, and the smallest, {}, {} KiB.",
+            budget.limits(),
+            entries[fastest].label,
+            digits(entries[fastest].time.median_ns),
+            entries[smallest].label,
+            digits(entries[smallest].memory_bytes / 1024.0)
+        );
+    }
     if let Some(best) = least(reliable, |e| e.error_texels) {
         return format!(
-            "No setting has a p99 error of at most {} texels; the most accurate one that is reliable, {}, \
+            "No setting has a p99 error of at most {} texels{}; the most accurate one that is reliable, {}, \
              has {}.",
             digits(budget.max_error_texels),
+            budget.limits(),
             entries[best].label,
             digits(entries[best].error_texels)
         );
     }
-    let all: Vec<usize> = (0..entries.len()).collect();
-    match least(&all, |e| e.failure_rate) {
+    match least(affordable, |e| e.failure_rate) {
         Some(best) => format!(
-            "Every setting fails on more than {} of rays (skipped hits, no answer or NaN); the most reliable, \
-             {}, on {}.",
+            "Every setting{} fails on more than {} of rays (hits skipped or in the air, no answer or NaN); the \
+             most reliable, {}, on {}.",
+            budget.limits(),
             percent(budget.max_failure_rate),
             entries[best].label,
             percent(entries[best].failure_rate)
@@ -133,10 +185,28 @@ mod tests {
 
     fn entry(label: &str, time: f64, spread: f64, error: f64, failure_rate: f64) -> Entry {
         let time = Timing { median_ns: time, low_ns: time - spread, high_ns: time + spread };
-        Entry { label: label.to_owned(), time, error_texels: error, failure_rate }
+        Entry { label: label.to_owned(), time, error_texels: error, failure_rate, memory_bytes: 4096.0 }
     }
 
-    const BUDGET: Budget = Budget { max_error_texels: 0.5, max_failure_rate: 1e-3 };
+    const BUDGET: Budget = Budget {
+        max_error_texels: 0.5,
+        max_failure_rate: 1e-3,
+        max_time_ns: f64::INFINITY,
+        max_memory_bytes: f64::INFINITY,
+    };
+
+    #[test]
+    fn time_and_memory_are_limits() {
+        let all = [entry("slow", 9.0, 0.0, 0.1, 0.0), entry("quick", 2.0, 0.0, 2.0, 0.0)];
+        assert_eq!(recommend(&all, &BUDGET).pick, Some(0));
+        let hurried = Budget { max_time_ns: 5.0, ..BUDGET };
+        let advice = recommend(&all, &hurried);
+        assert!(advice.pick.is_none() && advice.reason.contains("at most 5 ns a ray"), "{}", advice.reason);
+        assert_eq!(recommend(&all, &Budget { max_error_texels: 3.0, ..hurried }).pick, Some(1));
+        let tight = recommend(&all, &Budget { max_memory_bytes: 1024.0, ..BUDGET });
+        assert!(tight.pick.is_none() && tight.reason.contains("slow, 4 KiB"), "{}", tight.reason);
+        assert_eq!(Budget::of_errors(0.5, 1e-3), BUDGET);
+    }
 
     #[test]
     fn the_cheapest_within_the_budget_wins() {

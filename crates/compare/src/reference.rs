@@ -5,6 +5,7 @@ use heightfield::{Extent, HeightField, Status, oracle};
 use rayon::prelude::*;
 
 use crate::Rays;
+use crate::region::{Region, is_silhouette};
 
 /// The exact answer for one ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,6 +31,8 @@ pub struct ShadowRay {
     pub direction: [f64; 3],
     /// Whether the exact surface blocks it.
     pub occluded: bool,
+    /// Which ray it belongs to.
+    pub ray: usize,
 }
 
 /// Exact answers for a set of rays.
@@ -37,6 +40,8 @@ pub struct ShadowRay {
 pub struct Reference {
     /// One for each ray.
     pub truths: Vec<Truth>,
+    /// Where each of them lies on the relief; nothing without a hit.
+    pub regions: Vec<Region>,
     /// Shadow rays from the hits; those that face away from the light are left out.
     pub shadows: Vec<ShadowRay>,
 }
@@ -46,17 +51,29 @@ impl Reference {
     /// up) in turn: ray `i` looks at light `i % lights.len()`.
     pub fn new(field: &HeightField, rays: &Rays, lights: &[[f64; 3]]) -> Self {
         let truths: Vec<Truth> = (0..rays.len()).into_par_iter().map(|i| Truth::of(field, rays, i)).collect();
-        let shadows = if lights.is_empty() {
-            Vec::new()
-        } else {
-            truths
-                .par_iter()
-                .enumerate()
-                .filter(|(_, truth)| truth.hit)
-                .filter_map(|(i, truth)| ShadowRay::of(field, truth, lights[i % lights.len()]))
-                .collect()
-        };
-        Self { truths, shadows }
+        let mut regions: Vec<Region> = (0..rays.len())
+            .into_par_iter()
+            .map(|i| match truths[i].hit && is_silhouette(field, rays, i, &truths[i]) {
+                true => Region::Silhouette,
+                false => Region::Interior,
+            })
+            .collect();
+        if lights.is_empty() {
+            return Self { truths, regions, shadows: Vec::new() };
+        }
+        let answers: Vec<Option<ShadowRay>> = truths
+            .par_iter()
+            .enumerate()
+            .map(|(i, truth)| {
+                truth.hit.then(|| ShadowRay::of(field, truth, lights[i % lights.len()], i)).flatten()
+            })
+            .collect();
+        for (region, answer) in regions.iter_mut().zip(&answers) {
+            if *region == Region::Interior && answer.is_none_or(|ray| ray.occluded) {
+                *region = Region::Shadow;
+            }
+        }
+        Self { truths, regions, shadows: answers.into_iter().flatten().collect() }
     }
 
     /// Number of rays.
@@ -94,7 +111,7 @@ impl Truth {
 }
 
 impl ShadowRay {
-    fn of(field: &HeightField, truth: &Truth, direction: [f64; 3]) -> Option<Self> {
+    fn of(field: &HeightField, truth: &Truth, direction: [f64; 3], ray: usize) -> Option<Self> {
         let extent = field.extent();
         let towards = [
             direction[0] * f64::from(extent.tile_size[0]),
@@ -106,6 +123,6 @@ impl ShadowRay {
             return None;
         }
         let origin = [truth.uv[0], truth.uv[1], truth.z];
-        Some(Self { origin, direction, occluded: oracle::occluded(field, origin, direction) })
+        Some(Self { origin, direction, occluded: oracle::occluded(field, origin, direction), ray })
     }
 }

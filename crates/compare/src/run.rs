@@ -1,21 +1,29 @@
 //! A whole comparison of one height map: settings by elevations, errors and times.
 
-use bake::Progress;
-use heightfield::{BakedMap, HeightField, Hits, MarchOptions, RayArray, Segment, Technique, march};
+use std::sync::Arc;
+
+use heightfield::{HeightField, Hits, MarchOptions, RayArray, Segment, Technique, march};
 use rayon::prelude::*;
 
-use crate::metrics::percentile;
+use crate::cached::{Truths, truths};
+use crate::region::Region;
+use crate::setting::Setting;
+use crate::statistics::percentile;
+use crate::stores::{Stores, device_march};
 use crate::timing::time_cpu;
-use crate::{CompareError, DeviceMarch, Metrics, RayErrors, Rays, Reference, Reported, Timing, rays};
+use crate::{CompareError, DeviceMarch, Metrics, RayErrors, Reference, Reported, Timing};
 
 /// Most rays at one elevation: errors of all rays are kept until the end, for percentiles.
 pub const MAX_RAYS: usize = 1 << 20;
+
+/// Told what is done, the total, and a word about it; answers whether to go on.
+pub type Tell<'a> = dyn FnMut(usize, usize, &str) -> bool + 'a;
 
 /// What to compare, and how thoroughly.
 #[derive(Debug, Clone)]
 pub struct Plan {
     /// Settings to try.
-    pub techniques: Vec<Technique>,
+    pub settings: Vec<Setting>,
     /// View elevations in degrees, above 0 to 90, in mesh units.
     pub elevations_deg: Vec<f64>,
     /// Rays at each elevation.
@@ -30,11 +38,15 @@ pub struct Plan {
 #[derive(Debug, Clone)]
 pub struct Row {
     /// The setting.
-    pub technique: Technique,
+    pub setting: Setting,
     /// Elevation in degrees; `None` for all elevations together.
     pub elevation_deg: Option<f64>,
     /// How wrong it is.
     pub metrics: Metrics,
+    /// How wrong it is in each region that has rays.
+    pub regions: Vec<(Region, Metrics)>,
+    /// Bytes of texture that it reads.
+    pub memory_bytes: usize,
     /// Time a ray on the CPU, all cores.
     pub cpu: Timing,
     /// Time a ray on the device, if there is one.
@@ -64,9 +76,11 @@ struct Cell {
 
 /// Compares all settings at all elevations.
 ///
-/// The reference is found once for each elevation. Times are taken in turns - repeat by repeat over
-/// all settings - so that a machine that slows down is fair to all. `progress` gets what is done, the
-/// total, and a word about it; when it returns `false` the comparison stops.
+/// The reference is found once for each elevation, and kept for the next comparison. Times are taken in
+/// turns - repeat by repeat over all settings, every other time backwards - so that a machine that slows
+/// down is fair to all. The formats of maps are measured for what they do to errors; on the CPU all are
+/// marched as 32-bit floats, so that a setting that differs from another in its formats alone takes over
+/// the other's times.
 ///
 /// Rows come setting by setting: one for each elevation, then one for all of them together.
 ///
@@ -76,75 +90,128 @@ pub fn compare(
     field: &HeightField,
     plan: &Plan,
     device: Option<&dyn DeviceMarch>,
-    progress: &mut dyn FnMut(usize, usize, &str) -> bool,
+    progress: &mut Tell<'_>,
+) -> Result<Vec<Row>, CompareError> {
+    compare_stored(&mut Stores::new(field), plan, device, progress)
+}
+
+/// [`compare`] with maps that were prepared before.
+pub(crate) fn compare_stored(
+    stores: &mut Stores<'_>,
+    plan: &Plan,
+    device: Option<&dyn DeviceMarch>,
+    progress: &mut Tell<'_>,
 ) -> Result<Vec<Row>, CompareError> {
     plan.check()?;
-    let (settings, elevations) = (plan.techniques.len(), plan.elevations_deg.len());
-    let maps = missing_maps(field, &plan.techniques);
-    let total = maps.len() + elevations * (1 + settings * (1 + plan.repeats));
+    let (settings, elevations) = (plan.settings.len(), plan.elevations_deg.len());
+    let timed: Vec<usize> = (0..settings).map(|at| times_of(&plan.settings, at)).collect();
+    let own: Vec<usize> = (0..settings).filter(|&at| timed[at] == at).collect();
+    let total = settings + elevations * (1 + settings + own.len() * plan.repeats);
     let mut done = 0;
-    for map in maps {
-        let text = format!("baking map {:?}", map.name());
-        bake::provide(field, map, Progress::new(&mut |_, _| progress(done, total, &text)))?;
+    for setting in &plan.settings {
+        let text = format!("maps of {setting}");
+        stores.prepare(setting, &mut |_, _| progress(done, total, &text))?;
         done += 1;
     }
+    let field = stores.original();
     let mut tell = |text: &str, step: usize| {
         let going = progress(done, total, text);
         done += step;
         if going { Ok(()) } else { Err(CompareError::Interrupted) }
     };
-    let lights = rays::lights(field.extent(), plan.seed);
-    let mut sets = Vec::with_capacity(elevations);
+    let mut sets: Vec<Arc<Truths>> = Vec::with_capacity(elevations);
     let mut cells: Vec<Vec<Cell>> = (0..settings).map(|_| Vec::with_capacity(elevations)).collect();
     for &elevation in &plan.elevations_deg {
         tell(&format!("exact surface at {elevation} degrees"), 1)?;
-        let set = rays::planar(field, elevation, plan.rays, plan.seed)?;
-        let reference = Reference::new(field, &set, &lights);
-        for (technique, row) in plan.techniques.iter().zip(&mut cells) {
-            tell(&format!("errors of {technique} at {elevation} degrees"), 1)?;
-            row.push(measure(field, technique, &set, &reference, device)?);
+        let (set, _) = truths(field, elevation, plan.rays, plan.seed)?;
+        for (setting, row) in plan.settings.iter().zip(&mut cells) {
+            tell(&format!("errors of {setting} at {elevation} degrees"), 1)?;
+            row.push(measure(stores, setting, &set, device)?);
         }
         sets.push(set);
     }
     for repeat in 1..=plan.repeats {
         for (at, set) in sets.iter().enumerate() {
-            for (technique, row) in plan.techniques.iter().zip(&mut cells) {
-                tell(&format!("timing {technique}, round {repeat} of {}", plan.repeats), 1)?;
-                let cell = &mut row[at];
-                cell.cpu_seconds.push(time_cpu(field, technique, set)?);
+            let text = |setting: &Setting| format!("timing {setting}, round {repeat} of {}", plan.repeats);
+            let mut order = own.clone();
+            if repeat % 2 == 0 {
+                order.reverse();
+            }
+            for which in order {
+                let setting = &plan.settings[which];
+                tell(&text(setting), 1)?;
+                let cell = &mut cells[which][at];
+                cell.cpu_seconds.push(time_cpu(stores.field(setting), &setting.technique, &set.rays)?);
                 if let Some(device) = device {
-                    let (_, seconds) = device.march(field, technique, set).map_err(CompareError::Device)?;
+                    let (_, seconds) = device_march(device, stores, setting, &set.rays)?;
                     cell.device_seconds.push(seconds);
                 }
             }
         }
     }
     tell("done", 0)?;
-    let mut rows = Vec::with_capacity(settings * (elevations + 1));
-    for (technique, cells) in plan.techniques.iter().zip(&cells) {
-        for (cell, &elevation) in cells.iter().zip(&plan.elevations_deg) {
-            rows.push(row(technique, Some(elevation), &[cell], plan.rays)?);
+    for (which, &from) in timed.iter().enumerate().filter(|(which, from)| which != *from) {
+        let times: Vec<_> =
+            cells[from].iter().map(|cell| (cell.cpu_seconds.clone(), cell.device_seconds.clone())).collect();
+        for (cell, times) in cells[which].iter_mut().zip(times) {
+            (cell.cpu_seconds, cell.device_seconds) = times;
         }
-        rows.push(row(technique, None, &cells.iter().collect::<Vec<_>>(), plan.rays)?);
+    }
+    let mut rows = Vec::with_capacity(settings * (elevations + 1));
+    for (setting, cells) in plan.settings.iter().zip(&cells) {
+        let memory = setting.memory_bytes(stores.field(setting));
+        for (cell, &elevation) in cells.iter().zip(&plan.elevations_deg) {
+            rows.push(row(setting, Some(elevation), &[cell], plan.rays, memory)?);
+        }
+        rows.push(row(setting, None, &cells.iter().collect::<Vec<_>>(), plan.rays, memory)?);
     }
     Ok(rows)
 }
 
-/// The baked maps that some technique reads and the field does not have, each once.
-fn missing_maps(field: &HeightField, techniques: &[Technique]) -> Vec<BakedMap> {
-    let mut maps = Vec::new();
-    for &map in techniques.iter().flat_map(|technique| technique.info.reads.baked()) {
-        if !field.has(map) && !maps.contains(&map) {
-            maps.push(map);
+/// Errors of one setting on seeded rays at some elevations together, without any timing: whether what was
+/// found on some rays holds on others.
+///
+/// # Errors
+/// As [`compare`].
+pub fn verify(
+    field: &HeightField,
+    plan: &Plan,
+    progress: &mut Tell<'_>,
+) -> Result<Vec<Metrics>, CompareError> {
+    plan.check()?;
+    let mut stores = Stores::new(field);
+    let total = plan.settings.len() * (1 + plan.elevations_deg.len());
+    let mut done = 0;
+    let mut all = Vec::with_capacity(plan.settings.len());
+    for setting in &plan.settings {
+        let text = format!("checking {setting}");
+        stores.prepare(setting, &mut |_, _| progress(done, total, &text))?;
+        done += 1;
+        let mut parts = Vec::with_capacity(plan.elevations_deg.len());
+        for &elevation in &plan.elevations_deg {
+            if !progress(done, total, &text) {
+                return Err(CompareError::Interrupted);
+            }
+            let (set, _) = truths(field, elevation, plan.rays, plan.seed)?;
+            parts.push(measure(&stores, setting, &set, None)?.errors);
+            done += 1;
         }
+        all.push(Metrics::of(&parts.iter().collect::<Vec<_>>()));
     }
-    maps
+    Ok(all)
+}
+
+/// Whose times a setting has: its own, or those of the first that differs in formats alone.
+fn times_of(settings: &[Setting], at: usize) -> usize {
+    let technique = &settings[at].technique;
+    let plain = settings.iter().position(|other| other.is_plain() && other.technique == *technique);
+    plain.or_else(|| settings.iter().position(|other| other.technique == *technique)).unwrap_or(at)
 }
 
 impl Plan {
     fn check(&self) -> Result<(), CompareError> {
         let few = |name, count: usize, expected: &str| Err(CompareError::setting(name, count, expected));
-        if self.techniques.is_empty() {
+        if self.settings.is_empty() {
             return few("techniques", 0, "at least one is needed");
         }
         if self.elevations_deg.is_empty() {
@@ -162,27 +229,21 @@ impl Plan {
 
 /// Errors of one setting on one set of rays; also warms CPU and device up for the timing.
 fn measure(
-    field: &HeightField,
-    technique: &Technique,
-    set: &Rays,
-    reference: &Reference,
+    stores: &Stores<'_>,
+    setting: &Setting,
+    set: &Truths,
     device: Option<&dyn DeviceMarch>,
 ) -> Result<Cell, CompareError> {
-    let hits = march(
-        field,
-        technique,
-        RayArray::F32(&set.origins),
-        RayArray::F32(&set.directions),
-        &MarchOptions::default(),
-    )?;
-    let mut errors = RayErrors::measure(field, set, reference, &reported(&hits))?;
-    if technique.info.casts_shadows {
-        let wrong = wrong_shadows(field, technique, reference);
-        errors.shadows = Some((reference.shadows.len(), wrong));
-    }
+    let (technique, field) = (&setting.technique, stores.field(setting));
+    let (origins, directions) = (RayArray::F32(&set.rays.origins), RayArray::F32(&set.rays.directions));
+    let hits = march(field, technique, origins, directions, &MarchOptions::default())?;
+    let errors = RayErrors::measure(stores.original(), &set.rays, &set.reference, &reported(&hits))?;
     let mut cell = Cell { errors, ..Cell::default() };
+    if technique.info.casts_shadows {
+        cell.errors.shadows = Some(wrong_shadows(field, technique, &set.reference));
+    }
     if let Some(device) = device {
-        let (theirs, _) = device.march(field, technique, set).map_err(CompareError::Device)?;
+        let (theirs, _) = device_march(device, stores, setting, &set.rays)?;
         (cell.device_uv, cell.device_status) = differences(field, &hits, &theirs);
     }
     Ok(cell)
@@ -200,19 +261,30 @@ pub fn reported(hits: &Hits) -> Reported<'_> {
     }
 }
 
-/// Shadow rays that a technique answers otherwise than the exact surface.
-fn wrong_shadows(field: &HeightField, technique: &Technique, reference: &Reference) -> usize {
+/// By region, shadow rays and how many of them a technique answers otherwise than the exact surface.
+fn wrong_shadows(
+    field: &HeightField,
+    technique: &Technique,
+    reference: &Reference,
+) -> [(usize, usize); Region::ALL.len()] {
     let period = heightfield::march::period(field.wrap());
-    reference
+    let wrong: Vec<bool> = reference
         .shadows
         .par_iter()
-        .filter(|ray| {
+        .map(|ray| {
             let cos_theta = field.extent().cos_theta(ray.direction);
             let occluded = Segment::clip(ray.origin, ray.direction, cos_theta, period)
                 .is_some_and(|s| technique.occluded(field, s.start, s.delta, cos_theta));
             occluded != ray.occluded
         })
-        .count()
+        .collect();
+    let mut counts = [(0, 0); Region::ALL.len()];
+    for (ray, wrong) in reference.shadows.iter().zip(wrong) {
+        let (tested, bad) = &mut counts[reference.regions[ray.ray] as usize];
+        *tested += 1;
+        *bad += usize::from(wrong);
+    }
+    counts
 }
 
 /// Distances in texels where both report a hit, and the number of rays where only one does.
@@ -233,10 +305,11 @@ fn differences(field: &HeightField, ours: &Hits, theirs: &Hits) -> (Vec<f32>, us
 }
 
 fn row(
-    technique: &Technique,
+    setting: &Setting,
     elevation_deg: Option<f64>,
     cells: &[&Cell],
     rays: usize,
+    memory_bytes: usize,
 ) -> Result<Row, CompareError> {
     let marched = rays * cells.len();
     let timing = |seconds: fn(&Cell) -> &Vec<f64>| {
@@ -258,10 +331,13 @@ fn row(
     });
     let cpu = timing(|cell| &cell.cpu_seconds)
         .ok_or_else(|| CompareError::setting("repeats", 0, "at least one is needed to take a time"))?;
+    let regions = Region::ALL.map(|region| (region, Metrics::of_region(&errors, region)));
     Ok(Row {
-        technique: *technique,
+        setting: *setting,
         elevation_deg,
         metrics: Metrics::of(&errors),
+        regions: regions.into_iter().filter(|(_, metrics)| metrics.rays > 0).collect(),
+        memory_bytes,
         cpu,
         device,
         device_difference,

@@ -15,6 +15,10 @@ pub trait DeviceMarch {
     fn march(&self, field: &HeightField, technique: &Technique, rays: &Rays) -> Result<(Hits, f64), String>;
 }
 
+/// Quotient of two medians below which times are a tie however little they scatter: where code and data
+/// happen to lie moves them by that much from one build or machine to the next.
+pub const LEAST_LEAD: f64 = 1.05;
+
 /// Nanoseconds per ray over several repeats.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Timing {
@@ -39,9 +43,10 @@ impl Timing {
         Some(Self { median_ns: at(0.5)?, low_ns: at(0.25)?, high_ns: at(0.75)? })
     }
 
-    /// Whether this is faster beyond the spread of both: the quartile ranges do not meet.
+    /// Whether this is faster beyond doubt: the quartile ranges do not meet, and the medians differ by
+    /// more than [`LEAST_LEAD`]. Anything else is a tie.
     pub fn clearly_faster(&self, other: &Self) -> bool {
-        self.high_ns < other.low_ns
+        self.high_ns < other.low_ns && self.median_ns * LEAST_LEAD < other.median_ns
     }
 }
 
@@ -78,5 +83,7 @@ mod tests {
         let c = Timing::of(&[9.0, 9.1, 9.2]).unwrap();
         assert!(!a.clearly_faster(&b) && !b.clearly_faster(&a));
         assert!(a.clearly_faster(&c) && !c.clearly_faster(&a));
+        let d = Timing::of(&[9.3, 9.31, 9.32]).unwrap();
+        assert!(!c.clearly_faster(&d), "3 % is no lead");
     }
 }

@@ -167,9 +167,9 @@ fn arrays_that_do_not_fit_are_refused() {
 fn a_whole_comparison_ranks_as_it_must() {
     let field = posts();
     let plan = Plan {
-        techniques: [("steep", vec![("steps", 8.0)]), ("relief", vec![]), ("exact", vec![])]
+        settings: [("steep", vec![("steps", 8.0)]), ("relief", vec![]), ("exact", vec![])]
             .iter()
-            .map(|(name, parameters)| sweep::with_parameters(name, parameters).unwrap())
+            .map(|(name, parameters)| sweep::with_parameters(name, parameters).unwrap().into())
             .collect(),
         elevations_deg: vec![90.0, 10.0],
         rays: 3000,
@@ -194,7 +194,7 @@ fn a_whole_comparison_ranks_as_it_must() {
 
     let stopped = compare::compare(&field, &plan, None, &mut |done, _, _| done < 3);
     assert_eq!(stopped.unwrap_err(), compare::CompareError::Interrupted);
-    let nothing = Plan { techniques: vec![], ..plan };
+    let nothing = Plan { settings: vec![], ..plan };
     assert!(compare::compare(&field, &nothing, None, &mut |_, _, _| true).is_err());
 }
 

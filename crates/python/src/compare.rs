@@ -5,7 +5,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use compare::pareto::{Candidate, front, ties};
 use compare::picture::View;
 use compare::recommend::{Budget, Entry, recommend};
-use compare::{Metrics, Plan, RayErrors, Rays, Reference, Reported, Row, Timing, sweep};
+use compare::{
+    Dropped, Format, Metrics, Plan, RayErrors, Rays, Reference, Region, Reported, Row, Setting, Timing, sweep,
+};
 use heightfield::{HeightField, Hits, Technique};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -27,8 +29,14 @@ impl Raise for compare::CompareError {
     }
 }
 
-/// Name and parameter values of a technique.
-type Setting = (String, Vec<(String, f64)>);
+/// Name and parameter values of a technique, and the formats of heights and cones.
+type Chosen = (String, Vec<(String, f64)>, String, String);
+
+fn parse_setting((name, values, heights, cones): &Chosen) -> PyResult<Setting> {
+    let plain = Setting::from(parse_technique(name, values)?);
+    let [heights, cones] = [heights, cones].map(|format| Format::named(format).map_err(Raise::raise));
+    Ok(plain.stored(heights?, cones?))
+}
 
 /// The device as the comparison sees it.
 struct DeviceRunner(Arc<render::Device>);
@@ -62,28 +70,31 @@ impl Reporter {
     }
 }
 
-/// Compares techniques on a height map; one dict for each technique and elevation, and one for all
-/// elevations together. No techniques stands for the default sweep. `device` is "cpu", "gpu", or
-/// "auto": a device if there is one; the second result says why there is none.
+/// Compares techniques on a height map: one dict for each setting and elevation, and one for all elevations
+/// together; one for each setting that was dropped after a first look; and why there is no device, if there
+/// is none. No settings stands for the adaptive sweep. `device` is "cpu", "gpu", or "auto": a device if
+/// there is one.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "one flat call from the Python facade")]
+#[expect(clippy::type_complexity, reason = "three results, named in the facade")]
 pub fn compare_planar<'py>(
     py: Python<'py>,
     field: &Field,
-    techniques: Vec<Setting>,
+    settings: Vec<Chosen>,
     elevations: Vec<f64>,
     rays: usize,
     repeats: usize,
     seed: u64,
     device: &str,
     progress: Option<Bound<'py, PyAny>>,
-) -> PyResult<(Bound<'py, PyList>, Option<String>)> {
-    let techniques = if techniques.is_empty() {
-        sweep::default_settings().map_err(Raise::raise)?
+) -> PyResult<(Bound<'py, PyList>, Bound<'py, PyList>, Option<String>)> {
+    let adaptive = settings.is_empty();
+    let settings = if adaptive {
+        sweep::defaults().map_err(Raise::raise)?.into_iter().map(Setting::from).collect()
     } else {
-        techniques.iter().map(|(name, values)| parse_technique(name, values)).collect::<PyResult<_>>()?
+        settings.iter().map(parse_setting).collect::<PyResult<_>>()?
     };
-    let plan = Plan { techniques, elevations_deg: elevations, rays, repeats, seed };
+    let plan = Plan { settings, elevations_deg: elevations, rays, repeats, seed };
     let field = field.shared();
     let text = Arc::new(Mutex::new(String::new()));
     let reporter = match progress {
@@ -93,7 +104,7 @@ pub fn compare_planar<'py>(
             Some(Bound::new(py, reporter)?.into_any())
         }
     };
-    let (rows, problem) = run(py, reporter.as_ref(), |task| {
+    let (rows, dropped, problem) = run(py, reporter.as_ref(), |task| {
         let (device, problem) = match device {
             "cpu" => (None, None),
             wanted => match DeviceRunner::new() {
@@ -103,33 +114,95 @@ pub fn compare_planar<'py>(
             },
         };
         let device = device.as_ref().map(|device| device as &dyn compare::DeviceMarch);
-        let rows = compare::compare(&field, &plan, device, &mut |done, total, now| {
+        let mut tell = |done: usize, total: usize, now: &str| {
             now.clone_into(&mut text.lock().unwrap_or_else(PoisonError::into_inner));
             task.advance(done, total)
-        })?;
-        Ok((rows, problem))
+        };
+        let (rows, dropped) = if adaptive {
+            compare::compare_adaptively(&field, &plan, device, &mut tell)?
+        } else {
+            (compare::compare(&field, &plan, device, &mut tell)?, Vec::new())
+        };
+        Ok((rows, dropped, problem))
     })?;
     let list = PyList::empty(py);
     for row in rows {
         list.append(row_to_dict(py, &row)?)?;
     }
-    Ok((list, problem))
+    let left_out = PyList::empty(py);
+    for setting in dropped {
+        left_out.append(dropped_to_dict(py, &setting)?)?;
+    }
+    Ok((list, left_out, problem))
+}
+
+/// Metrics of one setting on seeded rays at all these elevations together, without any timing.
+#[pyfunction]
+pub fn compare_verify<'py>(
+    py: Python<'py>,
+    field: &Field,
+    setting: Chosen,
+    elevations: Vec<f64>,
+    rays: usize,
+    seed: u64,
+) -> PyResult<Bound<'py, PyDict>> {
+    let settings = vec![parse_setting(&setting)?];
+    let plan = Plan { settings, elevations_deg: elevations, rays, repeats: 1, seed };
+    let field = field.shared();
+    let found = run(py, None, |task| {
+        compare::verify(&field, &plan, &mut |done, total, _| task.advance(done, total))
+    })?;
+    let dict = PyDict::new(py);
+    for metrics in &found {
+        set_metrics(&dict, metrics)?;
+    }
+    Ok(dict)
+}
+
+/// Bytes of texture that a setting reads.
+#[pyfunction]
+pub fn compare_memory(field: &Field, setting: Chosen) -> PyResult<usize> {
+    Ok(parse_setting(&setting)?.memory_bytes(&field.shared()))
+}
+
+fn set_setting(dict: &Bound<'_, PyDict>, setting: &Setting) -> PyResult<()> {
+    dict.set_item("technique", setting.technique.info.name)?;
+    let parameters = PyDict::new(dict.py());
+    for (name, value) in setting.technique.settings() {
+        parameters.set_item(name, value as i64)?;
+    }
+    dict.set_item("parameters", parameters)?;
+    dict.set_item("heights_format", setting.heights.name())?;
+    dict.set_item("cones_format", setting.reads_cones().then(|| setting.cones.name()))?;
+    dict.set_item("label", setting.to_string())
+}
+
+fn dropped_to_dict<'py>(py: Python<'py>, dropped: &Dropped) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    set_setting(&dict, &dropped.setting)?;
+    dict.set_item("time_ns_per_ray", dropped.time_ns)?;
+    dict.set_item("uv_error_p99_texels", dropped.uv_error_p99_texels)?;
+    dict.set_item("failure_rate", dropped.failure_rate)?;
+    Ok(dict)
 }
 
 fn row_to_dict<'py>(py: Python<'py>, row: &Row) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
-    dict.set_item("technique", row.technique.info.name)?;
-    let parameters = PyDict::new(py);
-    for (name, value) in row.technique.settings() {
-        parameters.set_item(name, value as i64)?;
-    }
-    dict.set_item("parameters", parameters)?;
+    set_setting(&dict, &row.setting)?;
+    dict.set_item("memory_bytes", row.memory_bytes)?;
     dict.set_item("elevation", row.elevation_deg)?;
     set_timing(&dict, "cpu", Some(&row.cpu))?;
     set_timing(&dict, "device", row.device.as_ref())?;
     set_metrics(&dict, &row.metrics)?;
     dict.set_item("device_difference_p99_texels", row.device_difference.map(|d| d.uv_p99_texels))?;
     dict.set_item("device_difference_hit_rate", row.device_difference.map(|d| d.status_rate))?;
+    let regions = PyDict::new(py);
+    for (region, metrics) in &row.regions {
+        let part = PyDict::new(py);
+        set_metrics(&part, metrics)?;
+        regions.set_item(region.name(), part)?;
+    }
+    dict.set_item("regions", regions)?;
     Ok(dict)
 }
 
@@ -143,6 +216,7 @@ fn set_metrics(dict: &Bound<'_, PyDict>, m: &Metrics) -> PyResult<()> {
     dict.set_item("rays", m.rays)?;
     dict.set_item("uv_error_median_texels", m.uv_error_median_texels)?;
     dict.set_item("uv_error_p99_texels", m.uv_error_p99_texels)?;
+    dict.set_item("uv_error_p99_bound_texels", m.uv_error_p99_bound_texels)?;
     dict.set_item("uv_error_max_texels", m.uv_error_max_texels)?;
     dict.set_item("share_above_1_texel", m.share_above_1_texel)?;
     dict.set_item("depth_error_p99", m.depth_error_p99)?;
@@ -154,6 +228,7 @@ fn set_metrics(dict: &Bound<'_, PyDict>, m: &Metrics) -> PyResult<()> {
     dict.set_item("unconverged_rate", m.unconverged_rate)?;
     dict.set_item("nan_count", m.nan_count)?;
     dict.set_item("failure_rate", m.failure_rate())?;
+    dict.set_item("failure_rate_bound", m.failure_rate_bound())?;
     dict.set_item("shadow_error_rate", m.shadow_error_rate)?;
     dict.set_item("steps_mean", m.steps_mean)
 }
@@ -176,19 +251,21 @@ impl CompareView {
         Ok(Self { field, view, size })
     }
 
-    /// `(H, W, 3)` uint8 sRGB, and `(H, W)` float32 hit errors in texels, NaN without a hit.
+    /// `(H, W, 3)` uint8 sRGB, `(H, W)` float32 hit errors in texels, NaN without a hit, and `(H, W)`
+    /// float32 height reads.
     fn picture<'py>(
         &self,
         py: Python<'py>,
         technique: &str,
         parameters: Vec<(String, f64)>,
-    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let technique = parse_technique(technique, &parameters)?;
         let made = run(py, None, |_| self.view.picture(&self.field, &technique))?;
         let [width, height] = self.size;
         let rgb = PyArray1::from_vec(py, made.rgb).reshape([height, width, 3])?;
         let error = PyArray1::from_vec(py, made.error_texels).reshape([height, width])?;
-        Ok((rgb.into_any(), error.into_any()))
+        let steps = PyArray1::from_vec(py, made.steps).reshape([height, width])?;
+        Ok((rgb.into_any(), error.into_any(), steps.into_any()))
     }
 }
 
@@ -227,8 +304,14 @@ impl SegmentReference {
         Ok(Self { field, rays, reference })
     }
 
-    /// Metrics of these hits: for all of them, for each of `groups` groups that `group` puts the
-    /// segments in, and `(N,)` float32 hit errors in texels, NaN where nothing is truly hit.
+    /// Whether the true hit of each segment lies beside an edge of the relief: `(N,)` bool.
+    fn silhouettes<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
+        let edges = self.reference.regions.iter().map(|&region| region == Region::Silhouette);
+        PyArray1::from_vec(py, edges.collect())
+    }
+
+    /// Metrics of these hits: for all of them, for each of `sets`, which are lists of the groups that
+    /// `group` puts the segments in, and `(N,)` float32 hit errors in texels, NaN where nothing is truly hit.
     #[expect(clippy::type_complexity, reason = "three results, named in the facade")]
     fn measure<'py>(
         &self,
@@ -237,7 +320,7 @@ impl SegmentReference {
         z: PyReadonlyArray1<'py, f32>,
         status: PyReadonlyArray1<'py, u8>,
         group: PyReadonlyArray1<'py, u8>,
-        groups: u8,
+        sets: Vec<Vec<u32>>,
     ) -> PyResult<(Bound<'py, PyDict>, Vec<Bound<'py, PyDict>>, Bound<'py, PyArray1<f32>>)> {
         let (uv, z) = (uv.as_slice()?, z.as_slice()?);
         let reported =
@@ -258,8 +341,9 @@ impl SegmentReference {
             set_metrics(&dict, &Metrics::of(&[errors]))?;
             Ok(dict)
         };
-        let split = (0..groups)
-            .map(|g| to_dict(&errors.select(|row| group[truly[row]] == g)))
+        let split = sets
+            .iter()
+            .map(|set| to_dict(&errors.select(|row| set.contains(&u32::from(group[truly[row]])))))
             .collect::<PyResult<Vec<_>>>()?;
         let mut texels = vec![f32::NAN; self.rays.len()];
         for (&i, &error) in truly.iter().zip(&errors.uv_texels) {
@@ -270,8 +354,8 @@ impl SegmentReference {
 }
 
 /// A measured setting: label, time per ray (lower quartile, median, upper quartile), p99 error in
-/// texels, share of rays that fail.
-type Measured = (String, [f64; 3], f64, f64);
+/// texels, share of rays that fail, bytes of texture.
+type Measured = (String, [f64; 3], f64, f64, f64);
 
 fn timing([low_ns, median_ns, high_ns]: [f64; 3]) -> Timing {
     Timing { median_ns, low_ns, high_ns }
@@ -284,7 +368,7 @@ fn timing([low_ns, median_ns, high_ns]: [f64; 3]) -> Timing {
 pub fn compare_front(measured: Vec<Measured>, max_failure_rate: f64) -> Vec<(usize, Vec<usize>)> {
     let candidates: Vec<Candidate> = measured
         .into_iter()
-        .map(|(_, time, error, failure_rate)| Candidate {
+        .map(|(_, time, error, failure_rate, _)| Candidate {
             time: timing(time),
             error,
             eligible: failure_rate <= max_failure_rate,
@@ -294,22 +378,22 @@ pub fn compare_front(measured: Vec<Measured>, max_failure_rate: f64) -> Vec<(usi
     kept.iter().map(|&i| (i, ties(&candidates, i, &kept))).collect()
 }
 
-/// Index of the cheapest setting within the budget, if any, and why.
+/// Index of the cheapest setting within the budget, if any, and why. The budget: p99 error in texels, share
+/// of failing rays, nanoseconds a ray, bytes of texture.
 #[pyfunction]
-pub fn compare_recommend(
-    measured: Vec<Measured>,
-    max_error_texels: f64,
-    max_failure_rate: f64,
-) -> (Option<usize>, String) {
+pub fn compare_recommend(measured: Vec<Measured>, budget: [f64; 4]) -> (Option<usize>, String) {
     let entries: Vec<Entry> = measured
         .into_iter()
-        .map(|(label, time, error_texels, failure_rate)| Entry {
+        .map(|(label, time, error_texels, failure_rate, memory_bytes)| Entry {
             label,
             time: timing(time),
             error_texels,
             failure_rate,
+            memory_bytes,
         })
         .collect();
-    let advice = recommend(&entries, &Budget { max_error_texels, max_failure_rate });
+    let [max_error_texels, max_failure_rate, max_time_ns, max_memory_bytes] = budget;
+    let budget = Budget { max_error_texels, max_failure_rate, max_time_ns, max_memory_bytes };
+    let advice = recommend(&entries, &budget);
     (advice.pick, advice.reason)
 }

@@ -7,6 +7,7 @@ mod baking;
 mod compare;
 mod detail;
 mod errors;
+mod export;
 mod field;
 mod images;
 mod march;
@@ -25,11 +26,16 @@ mod _bumpwgpu {
     #[pymodule_export]
     use crate::baking::{bake_file, bake_map, map_bytes, map_registry, save_map};
     #[pymodule_export]
-    use crate::compare::{CompareView, SegmentReference, compare_front, compare_planar, compare_recommend};
+    use crate::compare::{
+        CompareView, SegmentReference, compare_front, compare_memory, compare_planar, compare_recommend,
+        compare_verify,
+    };
     #[pymodule_export]
     use crate::detail::{bake_detail, bake_tangents, mesh_map_registry};
     #[pymodule_export]
     use crate::errors::classes::{BakeError, BumpError, CompareError, MeshError, RenderError};
+    #[pymodule_export]
+    use crate::export::export_search;
     #[pymodule_export]
     use crate::field::Field;
     #[pymodule_export]
