@@ -37,6 +37,7 @@ from .repair import (
 )
 from .scene import Camera, Light, Material
 from .streaming import march_stream
+from .stress import StressResult, stress
 from .system import info
 
 if "XDG_RUNTIME_DIR" not in _os.environ:
@@ -73,6 +74,7 @@ __all__ = [
     "RenderError",
     "Scene",
     "Seam",
+    "StressResult",
     "Tangents",
     "TileReport",
     "__version__",
@@ -87,6 +89,7 @@ __all__ = [
     "march",
     "march_stream",
     "render",
+    "stress",
     "surfaces",
     "tangents",
     "techniques",

@@ -52,6 +52,7 @@ __all__ = [
     "effective_bits",
     "export_search",
     "integrate_normals",
+    "judge",
     "map_bytes",
     "map_registry",
     "march",
@@ -256,6 +257,13 @@ def integrate_normals(
     steepest: float,
     progress: _Progress,
 ) -> tuple[NDArray[np.float32], dict[str, Any]]: ...
+def judge(
+    heights: NDArray[np.float32],
+    wrap: str,
+    origins: NDArray[np.float64],
+    directions: NDArray[np.float64],
+    reported: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
 def map_bytes(map: str, options: _Options, width: int, height: int, wrap: str) -> tuple[int, int]: ...
 def map_registry() -> list[dict[str, Any]]: ...
 def mesh_map_registry() -> list[dict[str, Any]]: ...

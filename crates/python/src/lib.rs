@@ -15,6 +15,7 @@ mod mesh;
 mod rendering;
 mod repair;
 mod run;
+mod stress;
 mod surface;
 mod system;
 
@@ -48,6 +49,8 @@ mod _bumpwgpu {
     use crate::rendering::{PyMaterial, adapters, aov_names, march_gpu, render_scene};
     #[pymodule_export]
     use crate::repair::{check_normals, dequantise, derivatives, integrate_normals, quantum, seams};
+    #[pymodule_export]
+    use crate::stress::judge;
     #[pymodule_export]
     use crate::surface::{bend_normals, surface_points};
     #[pymodule_export]

@@ -1,0 +1,322 @@
+"""Bakes under stress: against formulas in double precision, brute force, and symmetries."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._map_info import MAPS
+from ._stress_cases import WRAPS
+from .errors import BumpWarning
+from .heightmap import HeightMap
+
+__all__ = ["bake_checks"]
+
+Bake = Callable[..., Any]
+Check = dict[str, Any]
+Heights = NDArray[np.float64]
+
+#: Maps whose values a shift of a repeating map moves along and does not change.
+_SHIFTING = ("normal", "normal_xy", "relief", "cone", "curvature", "horizon", "ao", "bent_normal")
+#: Their first channel points along x, so that mirroring the map turns its sign.
+_SIGNED = ("normal", "normal_xy", "relief", "bent_normal")
+#: Mean change of horizons and occlusion when the map is shifted or mirrored.
+MOST_MEAN = 4e-3
+#: Scales of the relief a map is baked at, mesh units.
+_SCALES = (1e-6, 0.1, 1e6)
+_EPSILON = 2.0**-24
+_TAPS = {
+    "sobel3": ((1, 2, 1), 4.0),
+    "scharr": ((3, 10, 3), 16.0),
+    "prewitt": ((1, 1, 1), 3.0),
+    "bilinear": ((1, 6, 1), 8.0),
+    "central": ((0, 1, 0), 1.0),
+}
+
+
+def bake_checks(
+    bake: Bake, name: str, heights: NDArray[np.float32], case: str
+) -> Iterator[tuple[str, Check]]:
+    """Bakes one map from heights in several ways; yields the case and what was found."""
+    for wrap in WRAPS:
+        # Pyramids and cones are of the heights alone.
+        for scale in (0.1,) if name in ("pyramid", "cone", "relaxed_cone", "distance") else _SCALES:
+            source = HeightMap(heights, scale=scale, wrap=wrap)
+            label = f"{case}, {wrap}, scale {scale:g}"
+            try:
+                made = _bake(bake, source, name)
+            except Exception as error:  # a fault in what is tested must become a line in the table
+                yield label, _failed("runs", f"{type(error).__name__}: {error}")
+                continue
+            for check in _of_one(bake, name, source, made):
+                yield label, check
+
+
+def _bake(bake: Bake, source: HeightMap, name: str, **options: Any) -> list[NDArray[np.float64]]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", BumpWarning)
+        made = bake(source, (name,), **options)[name]
+    return [np.asarray(layer, np.float64) for layer in (made if isinstance(made, tuple | list) else (made,))]
+
+
+def _of_one(bake: Bake, name: str, source: HeightMap, made: list[NDArray[np.float64]]) -> Iterator[Check]:
+    yield _check("finite", [~np.isfinite(layer) for layer in made], "values", 0.0, np.sum)
+    yield _range(name, made)
+    if name in ("normal", "relief", "bent_normal", "normal_mips"):
+        shortest = _lengths(name, made)
+        yield _check("unit length", [np.abs(length - 1.0) for length in shortest], "length", 1e-5)
+    if name in ("normal", "normal_xy", "relief"):
+        yield from _normals(bake, name, source)
+    if name in ("cone", "relaxed_cone"):
+        yield _cones(name, source, made[0])
+    if name == "pyramid":
+        yield from _pyramid(source, made)
+    if name == "distance":
+        yield _distances(source, made[0])
+    if name in ("horizon", "ao") and np.ptp(source.array) == 0.0:
+        flat = 1.0 if name == "ao" else 0.0
+        yield _check("flat ground", [np.abs(layer - flat) for layer in made], "value", 1e-6)
+    if name in _SHIFTING and source.scale == 0.1:
+        yield from _symmetries(bake, name, source, made[0])
+
+
+def _range(name: str, made: list[NDArray[np.float64]]) -> Check:
+    beyond = []
+    for layer in made:
+        parts = layer[..., None] if len(MAPS[name].channels) == 1 else layer
+        for at, channel in enumerate(MAPS[name].channels):
+            if channel.range is not None:
+                low, high = channel.range
+                beyond.append(np.maximum(parts[..., at] - high, low - parts[..., at]))
+    # Directions may be longer than 1 by their rounding.
+    slack = 1e-6 if name in (*_SIGNED, "normal_mips") else 0.0
+    return _check("in range", beyond or [np.zeros(1)], "value", slack)
+
+
+def _lengths(name: str, made: list[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
+    layers = made[:1] if name == "normal_mips" else made
+    return [np.linalg.norm(layer[..., :3], axis=-1) for layer in layers]
+
+
+def _normals(bake: Bake, name: str, source: HeightMap) -> Iterator[Check]:
+    """Angle to what each kernel's formula gives in double precision, degrees, beyond that of rounding."""
+    for kernel, taps in _TAPS.items():
+        made = _bake(bake, source, name, kernel=kernel)[0]
+        truth = _true_normals(source, *taps)
+        if name == "normal_xy":
+            z = np.sqrt(np.maximum(1.0 - (made**2).sum(axis=-1), 0.0))
+            made = np.concatenate([made, z[..., None]], axis=-1)
+        ours = made[..., :3]
+        # Near the horizon z is small, and with x and y alone it cannot be told sharply.
+        limit = 0.05 if name == "normal_xy" else 1e-3
+        chord = np.linalg.norm(ours - truth, axis=-1)
+        angle = np.degrees(2.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0)))
+        if name == "normal_xy":
+            angle = np.where(
+                truth[..., 2] > 0.02, angle, np.degrees(np.linalg.norm((ours - truth)[..., :2], axis=-1))
+            )
+        # Eight roundings of sums below 2 to 32 bits, as an angle: what steep reliefs make of them.
+        rows, columns = source.shape
+        steepest = source.scale * max(columns / source.tile_size[0], rows / source.tile_size[1])
+        rounding = np.degrees(8.0 * _EPSILON * steepest * truth[..., 2] ** 2)
+        yield _check(f"formula, {kernel}", [np.maximum(angle - rounding, 0.0)], "degrees", limit)
+
+
+def _true_normals(source: HeightMap, smoothing: tuple[int, int, int], total: float) -> Heights:
+    heights = _padded(source)
+    rows, columns = source.shape
+    near = {
+        (i, j): heights[1 + j : 1 + j + rows, 1 + i : 1 + i + columns] for i in (-1, 0, 1) for j in (-1, 0, 1)
+    }
+    across = sum(smoothing[j + 1] * (near[1, j] - near[-1, j]) for j in (-1, 0, 1)) / (2.0 * total)
+    downwards = sum(smoothing[i + 1] * (near[i, 1] - near[i, -1]) for i in (-1, 0, 1)) / (2.0 * total)
+    wide, tall = source.tile_size
+    x = -np.float64(np.float32(source.scale)) * across * columns / wide
+    # Green points up the image, and rows count down it.
+    y = np.float64(np.float32(source.scale)) * downwards * rows / tall
+    normals = np.stack(np.broadcast_arrays(x, y, 1.0), axis=-1)
+    unit: Heights = normals / np.linalg.norm(normals, axis=-1, keepdims=True)
+    return unit
+
+
+def _padded(source: HeightMap, by: int = 1) -> Heights:
+    """The heights with what lies beyond the edge, in double precision."""
+    rows, columns = (_folded(np.arange(-by, side + by), side, source.wrap) for side in source.shape)
+    return source.array.astype(np.float64)[np.ix_(rows, columns)]
+
+
+def _folded(index: NDArray[np.int64], side: int, wrap: str) -> NDArray[np.int64]:
+    if wrap == "repeat":
+        return index % side
+    if wrap == "clamp":
+        return np.clip(index, 0, side - 1)
+    turned = index % (2 * side)
+    return np.where(turned < side, turned, 2 * side - 1 - turned)
+
+
+def _surface(source: HeightMap, u: Heights, v: Heights) -> Heights:
+    """The bilinear surface in double precision."""
+    rows, columns = source.shape
+    x, y = u * columns - 0.5, v * rows - 0.5
+    i, j = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+    f, g = x - i, y - j
+    heights = source.array.astype(np.float64)
+    left, right = (_folded(i + step, columns, source.wrap) for step in (0, 1))
+    above, below = (_folded(j + step, rows, source.wrap) for step in (0, 1))
+    upper = heights[above, left] * (1 - f) + heights[above, right] * f
+    lower = heights[below, left] * (1 - f) + heights[below, right] * f
+    surface: Heights = upper * (1 - g) + lower * g
+    return surface
+
+
+def _cones(name: str, source: HeightMap, ratios: NDArray[np.float64]) -> Check:
+    """How far the surface reaches into cones that stand on points less than a texel from their centres.
+
+    A cone of the map must be empty, a relaxed one may hold the surface only where that rises as the way
+    leads out: a ray that entered there cannot come out again.
+    """
+    rng = np.random.default_rng(5)
+    rows, columns = source.shape
+    # Of large maps some texels, looked at closely near by and up to one and a half tiles away.
+    texels = rng.permutation(rows * columns)[:256]
+    row, column = np.unravel_index(texels, (rows, columns))
+    turn = np.linspace(0.0, 2 * np.pi, 16, endpoint=False)
+    near, far = np.linspace(0.0, 4.0 / max(rows, columns), 49)[1:], np.linspace(0.0, 1.5, 97)[1:]
+    reach = np.unique(np.concatenate([near, far]))
+    ratio = np.maximum(ratios[row, column][:, None], 1e-30)
+    worst = np.zeros((rows, columns))
+    for _ in range(2):
+        u = (column + 0.5 + rng.uniform(-1.0, 1.0, len(column))) / columns
+        v = (row + 0.5 + rng.uniform(-1.0, 1.0, len(row))) / rows
+        low = _surface(source, u, v)
+        for angle in turn:
+            along = _surface(
+                source,
+                u[:, None] + np.cos(angle) * reach,
+                v[:, None] + np.sin(angle) * reach,
+            )
+            inside = along - low[:, None] - reach / ratio
+            if name == "relaxed_cone":
+                falls = np.diff(along, axis=1, append=along[:, -1:]) < 0.0
+                inside = np.where(falls, inside, 0.0)
+            worst[row, column] = np.maximum(worst[row, column], inside.max(axis=1))
+    return _check("conservative", [worst], "heights", 1e-6)
+
+
+def _pyramid(source: HeightMap, made: list[NDArray[np.float64]]) -> Iterator[Check]:
+    """Levels hold the least and the greatest of the heights below them."""
+    heights = source.array.astype(np.float64)
+    top = made[-1].reshape(-1, 2)
+    off = [np.abs(top[:, 0].min() - heights.min()), np.abs(top[:, 1].max() - heights.max())]
+    yield _check("top level", [np.array(off)], "heights", 0.0)
+    # Each cell's four corners lie between its two numbers.
+    rows, columns = made[0].shape[:2]
+    wrapped = _padded(source)
+    corners = [wrapped[1 + j : 1 + j + rows, 1 + i : 1 + i + columns] for j in (0, 1) for i in (0, 1)]
+    if all(part.shape == (rows, columns) for part in corners):
+        above = [part - made[0][..., 1] for part in corners]
+        below = [made[0][..., 0] - part for part in corners]
+        yield _check("holds the cells", [*above, *below], "heights", 0.0)
+
+
+def _distances(source: HeightMap, made: NDArray[np.float64]) -> Check:
+    """How much longer a distance is than one to a point of the surface, mesh units."""
+    rng = np.random.default_rng(6)
+    depth, rows, columns = made.shape
+    count = 4096
+    k, j, i = rng.integers(0, depth, count), rng.integers(0, rows, count), rng.integers(0, columns, count)
+    z = (k + rng.random(count)) / depth
+    u, v = (i + rng.random(count)) / columns, (j + rng.random(count)) / rows
+    near = np.full(count, np.inf)
+    wide, tall = source.tile_size
+    for _ in range(160):
+        size = 10.0 ** rng.uniform(-3.0, 0.0, count)
+        a, b = u + rng.normal(size=count) * size, v + rng.normal(size=count) * size
+        rise = source.scale * (_surface(source, a, b) - z)
+        near = np.minimum(near, np.sqrt(((a - u) * wide) ** 2 + ((b - v) * tall) ** 2 + rise**2))
+    # Points below the surface are none that a search stands on.
+    over = z > _surface(source, u, v)
+    longer = np.where(over, made[k, j, i] - near, 0.0)
+    return _check("lower bound", [longer], "mesh units", 1e-6)
+
+
+def _symmetries(bake: Bake, name: str, source: HeightMap, made: NDArray[np.float64]) -> Iterator[Check]:
+    axis = 1 if name == "horizon" else 0
+    if source.wrap == "repeat" and min(source.shape) > 2:
+        moved = _bake(bake, _with(source, np.roll(source.array, (2, 3), (0, 1))), name)[0]
+        back = np.roll(moved, (-2, -3), (axis, axis + 1))
+        yield _compared(name, "shifted", back, made)
+    if name != "horizon":
+        turned = _bake(bake, _with(source, source.array[:, ::-1]), name)[0][:, ::-1]
+        if name in _SIGNED:
+            turned = turned.copy()
+            turned[..., 0] *= -1.0
+        yield _compared(name, "mirrored", turned, made)
+
+
+def _compared(name: str, check: str, again: NDArray[np.float64], made: NDArray[np.float64]) -> Check:
+    """Two bakes of equal maps: the worst value, or the mean where values are samples."""
+    difference = np.abs(again - made)
+    if name in ("horizon", "ao", "bent_normal"):
+        # Sweeps meet the texels of a shifted map between others of their lines: beside a lone spike that
+        # changes single values, while a fault at the edge changes all along it.
+        row = _check(check, [difference], "mean value", MOST_MEAN)
+        mean = float(difference.mean())
+        return {**row, "worst": mean, "passed": mean <= MOST_MEAN}
+    if name in ("cone", "relaxed_cone"):
+        # Lower bounds over blocks of cells: how much they give away depends on where blocks lie.
+        return _check(check, [difference], "ratio", 2e-3)
+    largest = float(np.abs(made[np.isfinite(made)]).max(initial=0.0))
+    return _check(check, [difference], "value", 4e-6 * max(1.0, largest))
+
+
+def _with(source: HeightMap, heights: NDArray[np.float32]) -> HeightMap:
+    return HeightMap(
+        np.ascontiguousarray(heights),
+        scale=source.scale,
+        base=source.base,
+        tile_size=source.tile_size,
+        wrap=source.wrap,
+    )
+
+
+def _check(
+    name: str,
+    values: list[Any],
+    unit: str,
+    limit: float,
+    total: Callable[..., Any] | None = None,
+) -> Check:
+    """The worst of several arrays, and where it is."""
+    worst, where = 0.0, ""
+    for number, part in enumerate(values):
+        array = np.asarray(part, np.float64)
+        array = np.where(np.isnan(array), np.inf, array)
+        value = float(array.max(initial=0.0)) if total is None else float(total(array))
+        if value > worst:
+            at = np.unravel_index(int(array.argmax()), array.shape)
+            level = f"level {number}, " if len(values) > 1 else ""
+            worst, where = value, level + f"at {tuple(int(part) for part in at)}"
+    return {
+        "check": name,
+        "worst": worst,
+        "unit": unit,
+        "limit": limit,
+        "passed": worst <= limit,
+        "where": where,
+    }
+
+
+def _failed(name: str, what: str) -> Check:
+    return {
+        "check": name,
+        "worst": float("inf"),
+        "unit": "errors",
+        "limit": 0.0,
+        "passed": False,
+        "where": what,
+    }

@@ -1,0 +1,244 @@
+"""The stability suite: it passes what is sound and finds every fault planted on purpose."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import bumpwgpu as bw
+from bumpwgpu import _bumpwgpu
+
+RAYS = 16
+
+
+def march_only(march: Any = None, technique: Any = "exact", only: str = "grazing") -> bw.StressResult:
+    return bw.stress(technique, maps=[], frames=[], march=march, rays=RAYS, only=only)
+
+
+def bake_only(name: str, bake: Any = None) -> bw.StressResult:
+    return bw.stress([], maps=[name], frames=[], bake=bake, only="odd")
+
+
+def checks(result: bw.StressResult) -> set[str]:
+    return {row["check"] for row in result.failures}
+
+
+@pytest.fixture(scope="module")
+def sound() -> bw.StressResult:
+    return bw.stress(["relief", "exact"], maps=["curvature"], frames=["mikktspace"], rays=RAYS)
+
+
+def test_what_is_sound_passes(sound: bw.StressResult) -> None:
+    assert sound, str(sound)
+    assert not sound.failures
+    groups = {row["group"] for row in sound.rows}
+    assert groups == {
+        "grazing", "offset", "scale", "map", "cell border", "length", "far start", "mesh",
+    }  # fmt: skip
+    names = {row["case"] for row in sound.rows}
+    assert {"89.99 degrees, repeat", "1e+06 tiles, f64", "denormal, mirror", "1 x N, clamp"} <= names
+    assert {"mirrored", "needle triangles", "all UVs equal"} <= names
+    ulps = max(row["worst"] for row in sound.rows if row["check"] == "on the surface")
+    # Measured: 1 for exact; the limit is 24.
+    assert 0.0 < ulps < 8.0
+    assert "checks, 0 failed" in str(sound)
+
+
+@pytest.mark.parametrize("technique", ["cone", "relaxed_cone", "distance", "pom"])
+def test_other_searches_pass_too(technique: str) -> None:
+    for only in ("cell border", "checkerboard", "89"):
+        made = march_only(technique=technique, only=only)
+        assert made, str(made)
+
+
+# Planted faults
+
+
+def shifted(hits: Any, t: Any) -> SimpleNamespace:
+    return SimpleNamespace(t=t, z=hits.z, status=hits.status)
+
+
+def test_an_epsilon_nudge_is_found() -> None:
+    def nudged(height_map: Any, origins: Any, directions: Any, technique: Any, **options: Any) -> Any:
+        # A start moved along the ray by 1e-5, as walks do that push themselves over a border.
+        moved = origins + directions * directions.dtype.type(1e-5)
+        return bw.march(height_map, moved, directions, technique, **options)
+
+    found = march_only(nudged)
+    assert {"on the surface", "on the ray"} <= checks(found)
+    for technique in ("pom", "interval", "parallax"):
+        assert "flat ground" in checks(march_only(nudged, technique, "flat 0.5"))
+
+
+def test_a_missing_wrap_is_found() -> None:
+    def clamped(height_map: Any, *rays: Any, **options: Any) -> Any:
+        other = bw.HeightMap(height_map.array, scale=height_map.scale, wrap="clamp")
+        return bw.march(other, *rays, **options)
+
+    assert {"on the surface", "whole tiles"} <= checks(march_only(clamped))
+    assert "whole tiles" in checks(march_only(clamped, "relief"))
+
+    def clamped_bake(height_map: Any, *arguments: Any, **options: Any) -> Any:
+        other = bw.HeightMap(height_map.array, scale=height_map.scale, wrap="clamp")
+        return bw.bake(other, *arguments, **options)
+
+    for name in ("normal", "cone", "ao", "horizon", "curvature"):
+        assert not bake_only(name, clamped_bake), name
+
+
+def test_a_search_that_skips_is_found() -> None:
+    def skipping(height_map: Any, origins: Any, directions: Any, technique: Any, **options: Any) -> Any:
+        return bw.march(
+            height_map, origins, directions, bw.techniques.Relief(linear=64, refine=24), **options
+        )
+
+    assert "nothing skipped" in checks(march_only(skipping))
+
+
+def test_answers_that_are_none_are_found() -> None:
+    def silent(*rays: Any, **options: Any) -> Any:
+        hits = bw.march(*rays, **options)
+        t = hits.t.copy()
+        t[3] = np.nan
+        return shifted(hits, t)
+
+    assert "answers" in checks(march_only(silent))
+
+    def raising(*_rays: Any, **_options: Any) -> Any:
+        raise RuntimeError("gave up")
+
+    broken = march_only(raising)
+    assert checks(broken) >= {"runs"}
+    assert "gave up" in str(broken)
+
+
+def test_a_swapped_green_is_found() -> None:
+    def swapped(*arguments: Any, **options: Any) -> Any:
+        return bw.bake(*arguments, convention="directx", **options)
+
+    for name in ("normal", "relief", "normal_xy"):
+        assert any(check.startswith("formula") for check in checks(bake_only(name, swapped))), name
+
+
+@pytest.mark.parametrize("name", ["cone", "relaxed_cone"])
+def test_a_cone_that_is_not_conservative_is_found(name: str) -> None:
+    def widened(*arguments: Any, **options: Any) -> Any:
+        made = bw.bake(*arguments, **options)
+        return {name: np.minimum(made[name] * 1.2, 1.0)}
+
+    assert "conservative" in checks(bake_only(name, widened))
+    assert bake_only(name)
+
+    def textbook(*arguments: Any, **options: Any) -> Any:
+        return bw.bake(*arguments, mode="texel", **options)
+
+    assert "conservative" in checks(bake_only(name, textbook))
+
+
+def test_other_faults_of_bakes_are_found() -> None:
+    def longer(*arguments: Any, **options: Any) -> Any:
+        made = bw.bake(*arguments, **options)
+        return {name: made[name] * 1.01 for name in made}
+
+    assert {"unit length", "in range"} <= checks(bake_only("normal", longer))
+    assert "lower bound" in checks(
+        bake_only("distance", lambda *a, **o: {"distance": bw.bake(*a, **o)["distance"] * 1.3 + 0.001})
+    )
+    lowered = bake_only(
+        "pyramid", lambda *a, **o: {"pyramid": [level * 0.999 for level in bw.bake(*a, **o)["pyramid"]]}
+    )
+    assert {"top level", "holds the cells"} <= checks(lowered)
+
+
+def test_faults_of_frames_are_found() -> None:
+    def tilted(positions: Any, faces: Any, uv: Any, normals: Any, method: str) -> Any:
+        made = bw.tangents(positions, faces, uv, normals, method)
+        bent = made.tangents.copy()
+        bent[:, :3] += 0.01 * normals[made.source]
+        bent[0, 3] = 0.0
+        return made._replace(tangents=bent)
+
+    found = bw.stress([], maps=[], frames=["mikktspace"], tangents=tilted)
+    assert {"upright", "handedness is 1 or -1"} <= checks(found)
+
+
+# The judge
+
+
+def test_the_judge_refuses_arrays_that_do_not_fit() -> None:
+    heights = np.zeros((2, 2), np.float32)
+    with pytest.raises(ValueError, match="3 results"):
+        _bumpwgpu.judge(heights, "repeat", np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(3))
+
+
+# Files and settings
+
+
+def test_results_are_written(sound: bw.StressResult, tmp_path: Path) -> None:
+    data = json.loads(sound.to_json(tmp_path / "stress.json").read_text())
+    assert len(data["rows"]) == len(sound.rows)
+    assert data["environment"]["version"] == bw.__version__
+    with sound.to_csv(tmp_path / "stress.csv").open() as lines:
+        assert len(list(csv.DictReader(lines))) == len(sound.rows)
+    assert len(sound.summary()) < len(sound.rows)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".svg"])
+def test_errors_are_plotted(sound: bw.StressResult, tmp_path: Path, suffix: str) -> None:
+    pytest.importorskip("matplotlib")
+    assert sound.plot(tmp_path / f"stress{suffix}").stat().st_size > 5000
+    with pytest.raises(ValueError, match="must end in"):
+        sound.plot(tmp_path / "stress.gif")
+    with pytest.raises(ValueError, match="nothing to plot"):
+        bw.StressResult([], {}).plot(tmp_path / "stress.png")
+
+
+def test_progress_is_told_and_can_stop_it() -> None:
+    seen: list[tuple[int, int, str]] = []
+    bw.stress([], maps=[], frames=["edge", "split"], progress=lambda *told: seen.append(told))
+    assert [told[0] for told in seen] == [0, 1, 2]
+    assert {told[1] for told in seen} == {2}
+
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        bw.stress(progress=stop)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "says"),
+    [
+        ({"techniques": "reliev"}, ValueError, "unknown technique"),
+        ({"techniques": "flat"}, ValueError, "does not search"),
+        ({"techniques": 3}, TypeError, "techniques"),
+        ({"maps": ["norml"]}, ValueError, "maps"),
+        ({"frames": ["mikk"]}, ValueError, "frames"),
+        ({"rays": 1}, ValueError, "rays"),
+        ({"device": "auto"}, ValueError, "device"),
+        ({"march": 3}, TypeError, "march must be callable"),
+        ({"only": 3}, TypeError, "only must be a string"),
+        ({"techniques": "exact", "only": "no such case"}, ValueError, "no case contains"),
+    ],
+)
+def test_senseless_settings_are_refused(arguments: dict[str, Any], error: type, says: str) -> None:
+    with pytest.raises(error, match=says):
+        bw.stress(**{"techniques": [], "maps": [], "frames": [], **arguments})
+
+
+@pytest.mark.slow
+def test_everything_passes() -> None:
+    made = bw.stress(rays=256)
+    assert made, str(made)
+
+
+@pytest.mark.gpu
+def test_the_device_passes() -> None:
+    made = bw.stress("exact", maps=[], frames=[], rays=RAYS, device="gpu")
+    assert made, str(made)
