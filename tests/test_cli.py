@@ -212,3 +212,84 @@ def test_ctrl_c(folder: Path) -> None:
     _, err = process.communicate(timeout=60)
     assert process.returncode == 130, err
     assert "Traceback" not in err
+
+
+def test_compare_fails_above_a_limit(folder: Path) -> None:
+    words = [
+        "compare",
+        "height.png",
+        "--elevations",
+        "30",
+        "--rays",
+        "500",
+        "--repeats",
+        "1",
+        "--device",
+        "cpu",
+        "--techniques",
+    ]
+    sound = run(*words, "--techniques", "exact", "--fail-above", 0.1, cwd=folder)
+    assert sound.returncode == 0, sound.stderr
+    coarse = run(*(*words, "--techniques", "steep(steps=4),exact", "--fail-above", 0.1, "--json"), cwd=folder)
+    assert coarse.returncode == cli.CHECK_FAILED
+    assert "steep(steps=4): p99 error" in coarse.stderr
+    assert json.loads(coarse.stdout)["above"] == ["steep(steps=4)"]
+
+
+def test_compare_writes_what_an_engine_needs(folder: Path) -> None:
+    words = (
+        "compare height.png --elevations 40 --rays 500 --repeats 1 --device cpu --techniques pom(steps=200)"
+    )
+    more = (
+        "--max-error 9 --mips 2 --engine bevy --shader wall.glsl --rows rows.csv --formats r32float,r8unorm"
+    )
+    done = run(*words.split(), *more.split(), cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert "ParallaxMappingMethod::Occlusion" in done.stdout
+    assert "mip 1, from" in done.stdout
+    assert "#version 300 es" in (folder / "wall.glsl").read_text()
+    assert "pom(steps=200) r8unorm" in (folder / "rows.csv").read_text()
+    for bad in ("--shader wall.txt", "--engine quake", "--formats bc5", "--rows rows.xml"):
+        assert run(*words.split(), *bad.split(), cwd=folder).returncode == 2
+
+
+def test_stress(folder: Path) -> None:
+    words = [
+        "stress",
+        "--techniques",
+        "exact",
+        "--maps",
+        "normal",
+        "--frames",
+        "none",
+        "--only",
+        "odd",
+        "--rays",
+        "16",
+    ]
+    done = run(*words, "--rows", "stress.json", cwd=folder)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "checks, 0 failed" in done.stdout
+    assert (folder / "stress.json").stat().st_size > 1000
+    data = json.loads(run(*words, "--json", cwd=folder).stdout)
+    assert data["passed"]
+    assert data["failures"] == []
+    assert run("stress", "--maps", "norml", cwd=folder).returncode == 2
+    nothing = run("stress", "--only", "no such case", cwd=folder)
+    assert (nothing.returncode, "no case contains" in nothing.stderr) == (1, True)
+
+
+def test_lint(folder: Path) -> None:
+    assert run("lint", "height.png", cwd=folder).returncode == 0
+    heights = bw.HeightMap(folder / "height.png")
+    down = bw.bake(heights, convention="directx")["normal"]
+    Image.fromarray(((down * 0.5 + 0.5) * 255).round().astype(np.uint8)).save(folder / "normal.png")
+    done = run("lint", ".", cwd=folder)
+    assert done.returncode == cli.CHECK_FAILED
+    assert "[wrong-green]" in done.stdout
+    assert run("lint", ".", "--convention", "directx", cwd=folder).returncode == 0
+    data = json.loads(
+        run("lint", "--normal", "normal.png", "--height", "height.png", "--json", cwd=folder).stdout
+    )
+    assert [finding["code"] for finding in data["findings"]] == ["wrong-green"]
+    assert run("lint", cwd=folder).returncode == 2

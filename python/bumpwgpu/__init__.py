@@ -18,6 +18,7 @@ from .engines import EngineSettings
 from .errors import BakeError, BumpError, BumpWarning, CompareError, MeshError, RenderError
 from .frames import Tangents, tangents
 from .heightmap import HeightMap
+from .lint import Finding, LintReport, lint
 from .maps import Maps
 from .marching import Hits, march
 from .mesh_maps import MeshMaps, MeshReport
@@ -53,6 +54,7 @@ __all__ = [
     "CompareResult",
     "CurlEvidence",
     "EngineSettings",
+    "Finding",
     "Frame",
     "HeightEvidence",
     "HeightMap",
@@ -60,6 +62,7 @@ __all__ = [
     "HorizonShadows",
     "IntegratedHeights",
     "Light",
+    "LintReport",
     "Maps",
     "Material",
     "Mesh",
@@ -86,6 +89,7 @@ __all__ = [
     "engines",
     "heights_from_normals",
     "info",
+    "lint",
     "march",
     "march_stream",
     "render",

@@ -14,7 +14,7 @@ from ._stress_cases import WRAPS
 from .errors import BumpWarning
 from .heightmap import HeightMap
 
-__all__ = ["bake_checks"]
+__all__ = ["bake_checks", "cones"]
 
 Bake = Callable[..., Any]
 Check = dict[str, Any]
@@ -72,7 +72,7 @@ def _of_one(bake: Bake, name: str, source: HeightMap, made: list[NDArray[np.floa
     if name in ("normal", "normal_xy", "relief"):
         yield from _normals(bake, name, source)
     if name in ("cone", "relaxed_cone"):
-        yield _cones(name, source, made[0])
+        yield cones(name, source, made[0])
     if name == "pyramid":
         yield from _pyramid(source, made)
     if name == "distance":
@@ -173,7 +173,7 @@ def _surface(source: HeightMap, u: Heights, v: Heights) -> Heights:
     return surface
 
 
-def _cones(name: str, source: HeightMap, ratios: NDArray[np.float64]) -> Check:
+def cones(name: str, source: HeightMap, ratios: NDArray[np.float64]) -> Check:
     """How far the surface reaches into cones that stand on points less than a texel from their centres.
 
     A cone of the map must be empty, a relaxed one may hold the surface only where that rises as the way

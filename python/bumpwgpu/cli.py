@@ -1,9 +1,10 @@
-"""The command line: ``bumpwgpu bake | render | compare | info``."""
+"""The command line: ``bumpwgpu bake | render | compare | stress | lint | info``."""
 
 from __future__ import annotations
 
 import inspect
 import json
+import math
 import sys
 import warnings
 from collections.abc import Callable, Iterator
@@ -18,20 +19,26 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rich.table import Table
 
 from . import __version__, techniques
+from ._atomic import replace_file
 from ._map_info import MAPS as MAP_INFO
 from ._map_info import OPTIONS, MapOption
 from .baking import MAPS
 from .baking import bake as bake_maps
 from .baking import bake_file as bake_map_file
-from .compare import ELEVATIONS, Scene
+from .compare import ELEVATIONS, FORMATS, Scene, advice_dict
 from .compare import compare as compare_techniques
+from .engines import ENGINES
 from .errors import BumpError
+from .frames import TANGENT_METHODS
 from .heightmap import HeightMap
+from .lint import lint as lint_sources
 from .mesh_maps import MESH_MAPS, MeshMaps
 from .meshes import Mesh
+from .recommending import LANGUAGES
 from .rendering import AOVS
 from .rendering import render as render_frame
 from .scene import Camera, Light, Material
+from .stress import stress as stress_everything
 from .system import info as system_info
 
 __all__ = ["app", "main"]
@@ -52,6 +59,9 @@ _MESHES: dict[str, Callable[[], Mesh]] = {
     "torus": Mesh.torus,
 }
 _MESH_SUFFIXES = (".obj", ".gltf", ".glb")
+_SHADERS = tuple(f".{language}" for language in LANGUAGES)
+#: What a command ends with when it ran and what it checked did not hold.
+CHECK_FAILED = 3
 _T = TypeVar("_T")
 
 
@@ -85,6 +95,21 @@ class SpaceChoice(Enum):
 
     TANGENT = "tangent"
     OBJECT = "object"
+
+
+class ConventionChoice(Enum):
+    """Values of --convention."""
+
+    OPENGL = "opengl"
+    DIRECTX = "directx"
+
+
+class SeverityChoice(Enum):
+    """Values of --fail-on."""
+
+    ERROR = "error"
+    WARNING = "warning"
+    INFO = "info"
 
 
 class DeviceChoice(Enum):
@@ -579,8 +604,6 @@ def _save_aovs(aovs: dict[str, Any], output: Path) -> list[Path]:
 
     import numpy as np
 
-    from ._atomic import replace_file
-
     made = []
     for name, values in aovs.items():
         data = BytesIO()
@@ -605,13 +628,39 @@ def compare(
         DeviceChoice, typer.Option(help="Whose time to take besides the CPU's.")
     ] = DeviceChoice.AUTO,
     max_error: Annotated[float, typer.Option(help="Error budget: texels at p99.", min=0.0)] = 0.5,
+    max_time: Annotated[float | None, typer.Option(help="Time budget: nanoseconds a ray.", min=0.0)] = None,
+    memory: Annotated[int | None, typer.Option(help="Memory budget: bytes of texture.", min=0)] = None,
+    fail_above: Annotated[
+        float | None,
+        typer.Option(
+            help="For CI: exit with 3 if a technique's p99 error, texels, is above this, or if more than 0.1 "
+            "% of its rays fail.",
+            min=0.0,
+        ),
+    ] = None,
+    formats: Annotated[
+        str, typer.Option(help=f"Texture formats to try --techniques with: {', '.join(FORMATS)}.")
+    ] = "",
+    mips: Annotated[int, typer.Option(help="Also recommend for this many mip levels.", min=0, max=16)] = 0,
+    engine: Annotated[
+        str, typer.Option(help=f"Also give the recommendation in the words of: {', '.join(ENGINES)}.")
+    ] = "",
+    shader: Annotated[
+        Path | None,
+        typer.Option(help=f"Write the recommended search as a shader: {', '.join(_SHADERS)}."),
+    ] = None,
     rays: Annotated[int, typer.Option(help="Rays at each elevation.", min=1)] = 8192,
     repeats: Annotated[int, typer.Option(help="Timed repeats.", min=1)] = 5,
     seed: Annotated[int, typer.Option(help="Fixes the rays.", min=0)] = 0,
     mesh: Annotated[
         str, typer.Option(help="Compare on this mesh: quad, cube, sphere, torus or a file. Needs a device.")
     ] = "",
-    eye: Annotated[str, typer.Option(help="With --mesh: where the camera is, x,y,z.")] = "0,-1.2,0.8",
+    eye: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="With --mesh: where the camera is, x,y,z. Given again, a path.", show_default="0,-1.2,0.8"
+        ),
+    ] = None,
     target: Annotated[str, typer.Option(help="With --mesh: what it looks at.")] = "0,0,0",
     size: Annotated[tuple[int, int], typer.Option(help="With --mesh: width and height, pixels.", min=1)] = (
         512,
@@ -621,7 +670,7 @@ def compare(
     plot: Annotated[
         Path | None, typer.Option(help="Write a plot (.png, .svg, .pdf); needs matplotlib.")
     ] = None,
-    rows: Annotated[Path | None, typer.Option(help="Write all rows as JSON.")] = None,
+    rows: Annotated[Path | None, typer.Option(help="Write all rows: .json or .csv.")] = None,
     scale: _Scale = 0.1,
     base: _Base = 1.0,
     tile_size: _Tile = (1.0, 1.0),
@@ -639,9 +688,18 @@ def compare(
     if not all(0.0 < angle <= 90.0 for angle in angles):
         raise typer.BadParameter(f"--elevations must be above 0 and at most 90 degrees, got {elevations}")
     span = _range(height_range)
-    camera = _usage(Camera.look_at, _numbers(eye, "--eye", 3), _numbers(target, "--target", 3))
-    if plot is not None:
-        _check_suffix(plot, (".png", ".svg", ".pdf"))
+    cameras = [
+        _usage(Camera.look_at, _numbers(place, "--eye", 3), _numbers(target, "--target", 3))
+        for place in eye or ["0,-1.2,0.8"]
+    ]
+    stored = _names(formats, FORMATS, "format") or None
+    if stored and chosen is None:
+        raise typer.BadParameter("--formats go with --techniques; without, formats are tried by themselves")
+    if engine:
+        _names(engine, ENGINES, "engine")
+    for path, known in ((plot, (".png", ".svg", ".pdf")), (shader, _SHADERS), (rows, (".json", ".csv"))):
+        if path is not None:
+            _check_suffix(path, known)
     with _session(json_output, quiet, verbose) as out:
         heights = HeightMap(
             source,
@@ -656,50 +714,78 @@ def compare(
         subject: HeightMap | Scene = heights
         if mesh:
             light = Light.directional((-0.6, -0.7, -0.9))
-            subject = Scene(_open_mesh(mesh), Material(height=heights), camera, (light,), size)
+            subject = Scene(_open_mesh(mesh), Material(height=heights), tuple(cameras), (light,), size)
         with out.progress("comparing") as advance:
             result = compare_techniques(
                 subject,
                 chosen,
                 elevations=angles,
+                formats=stored,
                 device=device.value,
                 rays=rays,
                 repeats=repeats,
                 seed=seed,
                 progress=advance,
             )
+        budget: dict[str, Any] = {"max_time": max_time, "memory": memory}
+        advice = result.recommend(max_error, **budget)
+        by_mip = []
+        if mips:
+            with out.progress("mips") as advance:
+                by_mip = result.recommend_by_mip(max_error, levels=mips, progress=advance, **budget)
         files = []
         if report is not None:
             files.append(result.report(report))
         if plot is not None:
             files.append(result.plot(plot))
         if rows is not None:
-            files.append(result.to_json(rows))
-        advice = result.recommend(max_error)
+            files.append(result.to_csv(rows) if rows.suffix.lower() == ".csv" else result.to_json(rows))
+        if shader is not None and advice:
+            language: Any = shader.suffix.lower()[1:]
+            files.append(replace_file(shader, advice.shader(language).encode()))
         listed = result.select("all") if verbose else result.pareto()
         out.show(_table(listed, result.timed_on))
         out.say(str(advice))
+        for part in by_mip:
+            out.say(f"mip {part.level}, from {part.distance():.3g} mesh units on: {part.recommendation}")
+        if engine and advice:
+            out.say(str(advice.settings(engine)))  # type: ignore[arg-type]
         for path in files:
             out.say(str(path))
+        above = [] if fail_above is None else result.exceeding(fail_above)
+        for row in above:
+            out.warn(
+                f"{row['label']}: p99 error {row['uv_error_p99_texels']:.3g} texels, "
+                f"{row['failure_rate']:.2%} failing; allowed: {fail_above:g}, 0.10%"
+            )
         out.result(
             {
+                **{name: value for name, value in advice_dict(advice).items() if name != "technique"},
                 "recommendation": advice.technique,
-                "parameters": advice.parameters,
-                "error_p99_texels": advice.error_p99_texels,
-                "reason": advice.reason,
                 "timed_on": result.timed_on,
                 "pareto": [row["label"] for row in result.pareto()],
+                "by_mip": [
+                    {"level": part.level, "size": part.size, **advice_dict(part.recommendation)}
+                    for part in by_mip
+                ],
+                "settings": dict(advice.settings(engine).values) if engine and advice else None,  # type: ignore[arg-type]
+                "above": [row["label"] for row in above],
                 "rows": result.rows,
+                "dropped": result.dropped,
                 "files": files,
             }
         )
+        if above:
+            raise typer.Exit(CHECK_FAILED)
 
 
 def _table(rows: list[dict[str, Any]], timed_on: str) -> Table:
     table = Table(title="time against error, all elevations")
     table.add_column("technique")
-    for heading in (f"ns/ray ({timed_on})", "p99 texels", "max texels", "failing"):
+    for heading in (f"ns/ray ({timed_on})", "p99 texels", "max texels", "failing", "KiB"):
         table.add_column(heading, justify="right")
+    if any(row.get("tied_with") for row in rows):
+        table.add_column("time tied with")
     for row in rows:
         errors = (row["uv_error_p99_texels"], row["uv_error_max_texels"])
         table.add_row(
@@ -707,8 +793,187 @@ def _table(rows: list[dict[str, Any]], timed_on: str) -> Table:
             f"{row[f'time_{timed_on}_ns_per_ray']:.1f}",
             *("-" if error is None else f"{error:.3g}" for error in errors),
             f"{row['failure_rate']:.2%}",
+            f"{row['memory_bytes'] / 1024:.4g}",
+            *([", ".join(row["tied_with"])] if "tied_with" in row else []),
         )
     return table
+
+
+@app.command()
+def stress(
+    technique_list: Annotated[
+        str, typer.Option("--techniques", help="Searches, with commas between; none.", show_default="all")
+    ] = "",
+    maps: Annotated[
+        str, typer.Option(help="Maps to bake, with commas between; none.", show_default="all")
+    ] = "",
+    frames: Annotated[
+        str, typer.Option(help="Tangent methods, with commas between; none.", show_default="all")
+    ] = "",
+    only: Annotated[str | None, typer.Option(help="Only cases whose group or name contains this.")] = None,
+    gpu: Annotated[bool, typer.Option("--gpu", help="Run searches on the device.")] = False,
+    rays: Annotated[int, typer.Option(help="Rays of a case.", min=8, max=65536)] = 128,
+    seed: Annotated[int, typer.Option(help="Fixes rays and maps.", min=0)] = 0,
+    rows: Annotated[Path | None, typer.Option(help="Write all rows: .json or .csv.")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Plot error against angle and offset (.png, .svg, .pdf).")
+    ] = None,
+    json_output: _Json = False,
+    quiet: _Quiet = False,
+    verbose: _Verbose = False,
+) -> None:
+    """Try searches, bakes and tangent frames on what breaks them; exit with 3 if something fails."""
+    chosen = [] if technique_list == "none" else _techniques(technique_list) or None
+    baked = [] if maps == "none" else _names(maps, MAPS, "map") or None
+    methods = [] if frames == "none" else _names(frames, tuple(TANGENT_METHODS), "method") or None
+    for path, known in ((plot, (".png", ".svg", ".pdf")), (rows, (".json", ".csv"))):
+        if path is not None:
+            _check_suffix(path, known)
+    with _session(json_output, quiet, verbose) as out:
+        with out.progress("stress") as advance:
+            result = stress_everything(
+                chosen,
+                maps=baked,
+                frames=methods,
+                only=only,
+                device="gpu" if gpu else "cpu",
+                rays=rays,
+                seed=seed,
+                progress=advance,
+            )
+        files = []
+        if rows is not None:
+            files.append(result.to_csv(rows) if rows.suffix.lower() == ".csv" else result.to_json(rows))
+        if plot is not None:
+            files.append(result.plot(plot))
+        summary = result.summary()
+        out.show(_stress_table(summary if verbose else _worst_of_subjects(summary)))
+        out.say(f"{len(result.rows)} checks, {len(result.failures)} failed")
+        for path in files:
+            out.say(str(path))
+        out.result(
+            {
+                "passed": bool(result),
+                "checks": len(result.rows),
+                "failures": [_jsonable(row) for row in result.failures],
+                "summary": [_jsonable(row) for row in summary],
+                "environment": result.environment,
+                "files": files,
+            }
+        )
+        if not result:
+            raise typer.Exit(CHECK_FAILED)
+
+
+def _worst_of_subjects(summary: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """What failed, and of each subject what came nearest to its limit."""
+
+    def severity(row: dict[str, Any]) -> float:
+        return float(row["worst"] / row["limit"]) if 0.0 < row["limit"] < float("inf") else 0.0
+
+    kept: dict[str, dict[str, Any]] = {}
+    for row in summary:
+        if row["subject"] not in kept or severity(row) > severity(kept[row["subject"]]):
+            kept[row["subject"]] = row
+    failed = [row for row in summary if not row["passed"]]
+    return [*failed, *(row for row in kept.values() if row["passed"])]
+
+
+def _jsonable(row: dict[str, Any]) -> dict[str, Any]:
+    """Infinite numbers as None."""
+    return {
+        name: None if isinstance(value, float) and not math.isfinite(value) else value
+        for name, value in row.items()
+    }
+
+
+def _stress_table(rows: list[dict[str, Any]]) -> Table:
+    table = Table(title="worst of each check")
+    for heading in ("", "subject", "group", "check"):
+        table.add_column(heading)
+    for heading in ("worst", "limit"):
+        table.add_column(heading, justify="right")
+    for heading in ("unit", "where"):
+        table.add_column(heading)
+    for row in rows:
+        where = f"{row['case']}: {row['where']}" if row["where"] else row["case"]
+        table.add_row(
+            "pass" if row["passed"] else "FAIL",
+            row["subject"],
+            row["group"],
+            row["check"],
+            f"{row['worst']:.3g}",
+            "-" if row["limit"] == float("inf") else f"{row['limit']:.3g}",
+            row["unit"],
+            where,
+        )
+    return table
+
+
+@app.command()
+def lint(
+    sources: Annotated[
+        list[Path] | None,
+        typer.Argument(help="Files and folders; names say what they hold, such as rock_normal.png."),
+    ] = None,
+    height: Annotated[Path | None, typer.Option(help="A height map, whatever its name.")] = None,
+    normal: Annotated[Path | None, typer.Option(help="A normal map.")] = None,
+    cone: Annotated[Path | None, typer.Option(help="A cone map.")] = None,
+    relaxed_cone: Annotated[Path | None, typer.Option(help="A relaxed cone map.")] = None,
+    mesh: Annotated[Path | None, typer.Option(help="A mesh: OBJ, glTF or GLB.")] = None,
+    convention: Annotated[
+        ConventionChoice, typer.Option(help="Which way green should point.")
+    ] = ConventionChoice.OPENGL,
+    wrap: _WrapOption = WrapChoice.REPEAT,
+    scale: Annotated[
+        float | None, typer.Option(help="Depth of the relief, mesh units, to hold normals against.", min=0.0)
+    ] = None,
+    tile_size: _Tile = (1.0, 1.0),
+    invert: Annotated[
+        bool | None,
+        typer.Option("--invert/--no-invert", help="Height maps hold depths.", show_default="by name"),
+    ] = None,
+    fail_on: Annotated[
+        SeverityChoice, typer.Option(help="Exit with 3 if there is a finding as bad as this.")
+    ] = SeverityChoice.ERROR,
+    json_output: _Json = False,
+    quiet: _Quiet = False,
+    verbose: _Verbose = False,
+) -> None:
+    """Find what breaks materials: green channels, 8-bit heights, seams, cones that cut the surface, UVs."""
+    given = [*(sources or []), height, normal, cone, relaxed_cone, mesh]
+    if not any(given):
+        raise typer.BadParameter(
+            "nothing to check: give files, folders, --height, --normal, --cone or --mesh"
+        )
+    with _session(json_output, quiet, verbose) as out:
+        report = lint_sources(
+            *(sources or []),
+            height=height,
+            normal=normal,
+            cone=cone,
+            relaxed_cone=relaxed_cone,
+            mesh=mesh,
+            convention=convention.value,
+            wrap=wrap.value,
+            scale=scale,
+            tile_size=tile_size,
+            invert=invert,
+        )
+        if verbose:
+            for name in report.checked:
+                out.say(name)
+        out.say(str(report))
+        bad = report.worse_than(fail_on.value)
+        out.result(
+            {
+                "checked": report.checked,
+                "findings": [finding._asdict() for finding in report.findings],
+                "failed": bool(bad),
+            }
+        )
+        if bad:
+            raise typer.Exit(CHECK_FAILED)
 
 
 @app.command()

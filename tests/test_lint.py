@@ -1,0 +1,241 @@
+"""Lint finds each fault when it is planted, and nothing in what is sound."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image, PngImagePlugin
+
+import bumpwgpu as bw
+from bumpwgpu.lint import CODES
+
+
+@pytest.fixture(scope="module")
+def wall() -> bw.HeightMap:
+    return bw.HeightMap.procedural("fbm", 64, scale=0.2)
+
+
+@pytest.fixture(scope="module")
+def normals(wall: bw.HeightMap) -> np.ndarray:
+    return bw.bake(wall)["normal"]
+
+
+def codes(report: bw.LintReport) -> list[str]:
+    assert {finding.code for finding in report.findings} <= CODES.keys()
+    return [finding.code for finding in report.findings]
+
+
+def test_what_is_sound_has_no_findings(wall: bw.HeightMap, normals: np.ndarray) -> None:
+    cones = bw.bake(wall, ("cone", "relaxed_cone"))
+    report = bw.lint(
+        height=wall.array,
+        normal=normals,
+        cone=cones["cone"],
+        relaxed_cone=cones["relaxed_cone"],
+        mesh=bw.Mesh.torus(),
+        scale=0.2,
+    )
+    assert codes(report) == []
+    assert report
+    assert len(report.checked) == 5
+    assert "5 checked: 0 errors, 0 warnings" in str(report)
+
+
+# Heights
+
+
+def test_heights_of_eight_bits(wall: bw.HeightMap) -> None:
+    assert codes(bw.lint(height=np.rint(wall.array * 255).astype(np.uint8))) == ["8-bit-heights"]
+    assert codes(bw.lint(height=np.rint(wall.array * 65535).astype(np.uint16))) == []
+
+
+def test_heights_without_relief_or_range(wall: bw.HeightMap) -> None:
+    assert codes(bw.lint(height=np.full((16, 16), 0.5))) == ["flat-heights"]
+    assert codes(bw.lint(height=wall.array * 0.1)) == ["unused-range"]
+
+
+def test_seams(wall: bw.HeightMap) -> None:
+    cut = wall.array[:, :41]
+    assert "tile-seam" in codes(bw.lint(height=cut))
+    assert codes(bw.lint(height=cut, wrap="clamp")) == []
+
+
+def test_srgb_tags_and_photographs(wall: bw.HeightMap, normals: np.ndarray, tmp_path: Path) -> None:
+    tagged = PngImagePlugin.PngInfo()
+    tagged.add(b"sRGB", b"\0")
+    levels = np.rint(wall.array * 65535).astype(np.uint16)
+    Image.fromarray(levels).save(tmp_path / "wall_height.png", pnginfo=tagged)
+    assert codes(bw.lint(tmp_path / "wall_height.png")) == ["srgb-tagged"]
+    colour = np.rint((normals * 0.5 + 0.5) * 255).astype(np.uint8)
+    Image.fromarray(colour).save(tmp_path / "wall_normal.jpg", quality=60)
+    assert "lossy" in codes(bw.lint(tmp_path / "wall_normal.jpg"))
+
+
+# Normals
+
+
+def test_green_the_other_way(wall: bw.HeightMap, normals: np.ndarray) -> None:
+    flipped = normals * np.array([1, -1, 1], np.float32)
+    assert codes(bw.lint(normal=flipped, height=wall.array)) == ["wrong-green"]
+    assert codes(bw.lint(normal=flipped)) == ["wrong-green"], "the curl alone decides"
+    assert codes(bw.lint(normal=flipped, convention="directx")) == []
+    assert not bw.lint(normal=flipped)
+
+
+def test_the_name_says_which_way_green_should_point(normals: np.ndarray, tmp_path: Path) -> None:
+    colour = np.rint((normals * 0.5 + 0.5) * 255).astype(np.uint8)
+    for name, expected in (("Rock_NormalGL.png", []), ("Rock_NormalDX.png", ["wrong-green"])):
+        Image.fromarray(colour).save(tmp_path / name)
+        assert codes(bw.lint(tmp_path / name)) == expected
+
+
+def test_vectors_that_are_none(normals: np.ndarray, wall: bw.HeightMap) -> None:
+    assert codes(bw.lint(normal=normals * np.float32(0.9))) == ["non-unit"]
+    inside_out = normals.copy()
+    inside_out[:8, :8, 2] *= -1
+    assert "inward" in codes(bw.lint(normal=inside_out))
+    exchanged = np.ascontiguousarray(normals[:, :, [1, 0, 2]])
+    assert "swapped-channels" in codes(bw.lint(normal=exchanged, height=wall.array))
+
+
+def test_normals_of_other_heights(wall: bw.HeightMap, normals: np.ndarray) -> None:
+    other = bw.HeightMap.procedural("fbm", 64, seed=5)
+    assert codes(bw.lint(normal=normals, height=other.array)) == ["height-mismatch"]
+    assert codes(bw.lint(normal=normals, height=wall.array, invert=True)) == ["inverted-heights"]
+    assert codes(bw.lint(normal=normals, height=wall.array, scale=0.02)) == ["scale-mismatch"]
+    assert codes(bw.lint(normal=normals, height=wall.array, scale=0.21)) == []
+    halves = np.ascontiguousarray(wall.array[::2, ::2])
+    assert "size-mismatch" in codes(bw.lint(normal=normals, height=halves))
+
+
+def test_seams_of_normals(normals: np.ndarray) -> None:
+    assert codes(bw.lint(normal=np.ascontiguousarray(normals[:, :37]))) == ["tile-seam"]
+
+
+# Cones
+
+
+@pytest.mark.parametrize("name", ["cone", "relaxed_cone"])
+def test_cones_that_cut_the_surface(wall: bw.HeightMap, name: str) -> None:
+    sound = bw.bake(wall, name)[name]
+    wide = np.minimum(sound * 1.3, 1.0)
+    assert codes(bw.lint(height=wall.array, **{name: wide})) == ["non-conservative-cone"]
+    textbook = bw.bake(wall, name, mode="texel")[name]
+    assert codes(bw.lint(height=wall.array, **{name: textbook})) == ["non-conservative-cone"]
+    down = np.floor(sound * 255).astype(np.uint8)
+    assert codes(bw.lint(height=wall.array, **{name: down})) == []
+    half = np.ascontiguousarray(sound[::2, ::2])
+    assert codes(bw.lint(height=wall.array, **{name: half})) == ["size-mismatch"]
+    assert codes(bw.lint(**{name: sound})) == ["unknown-role"]
+
+
+# Meshes
+
+
+def grid(uvs: Any = None, tangents: Any = None) -> bw.Mesh:
+    x, y = np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 5))
+    positions = np.stack([x.ravel(), y.ravel(), 0.0 * x.ravel()], axis=1)
+    at = np.arange(25).reshape(5, 5)
+    lower = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, :-1]], axis=-1).reshape(-1, 3)
+    upper = np.stack([at[:-1, 1:], at[1:, 1:], at[1:, :-1]], axis=-1).reshape(-1, 3)
+    flat = np.stack([x.ravel(), 1.0 - y.ravel()], axis=1)
+    return bw.Mesh(
+        positions, np.concatenate([lower, upper]), flat if uvs is None else uvs(flat), tangents=tangents
+    )
+
+
+@pytest.mark.filterwarnings("ignore::bumpwgpu.BumpWarning")
+def test_uvs() -> None:
+    assert codes(bw.lint(mesh=grid())) == []
+    assert codes(bw.lint(mesh=grid(lambda uv: 0.0 * uv))) == ["no-uvs"]
+    flattened = grid(lambda uv: np.where(uv[:, :1] < 0.5, [0.0, 1.0], [1.0, 1.0]) * uv)
+    assert "degenerate-uvs" in codes(bw.lint(mesh=flattened))
+    uneven = grid(
+        lambda uv: np.stack([np.where(uv[:, 0] > 0.5, 4 * uv[:, 0] - 1.5, uv[:, 0]), uv[:, 1]], axis=1)
+    )
+    assert codes(bw.lint(mesh=uneven)) == []
+    steeper = grid(
+        lambda uv: np.stack([np.where(uv[:, 0] > 0.5, 9 * uv[:, 0] - 4.0, uv[:, 0]), uv[:, 1]], axis=1)
+    )
+    assert codes(bw.lint(mesh=steeper)) == ["uv-density-jump"]
+
+
+@pytest.mark.filterwarnings("ignore::bumpwgpu.BumpWarning")
+def test_tangents_on_mirrored_seams() -> None:
+    def mirrored(uv: Any) -> Any:
+        return np.stack([np.abs(uv[:, 0] - 0.5), uv[:, 1]], axis=1)
+
+    assert codes(bw.lint(mesh=grid(mirrored))) == [], "no tangents, none to share"
+    along = np.tile([1.0, 0.0, 0.0, 1.0], (25, 1))
+    stored = bw.lint(mesh=grid(mirrored, along))
+    assert ("mirrored-seam-tangents", "error") in [(f.code, f.severity) for f in stored.findings]
+    assert codes(bw.lint(mesh=grid(None, along))) == []
+
+
+def test_stored_tangents() -> None:
+    turned = np.tile([1.0, 0.0, 0.0, -1.0], (25, 1))
+    assert codes(bw.lint(mesh=grid(None, turned))) == ["wrong-handedness"]
+    leaning = np.tile([0.6, 0.0, 0.8, 1.0], (25, 1))
+    assert "bad-tangents" in codes(bw.lint(mesh=grid(None, leaning)))
+    across = np.tile([0.6, 0.8, 0.0, 1.0], (25, 1))
+    assert codes(bw.lint(mesh=grid(None, across))) == ["tangent-space"]
+
+
+# Files
+
+
+def test_files_find_each_other_by_name(wall: bw.HeightMap, normals: np.ndarray, tmp_path: Path) -> None:
+    other = bw.HeightMap.procedural("fbm", 64, seed=5)
+    for name, heights in (("wall", wall), ("rock", other)):
+        levels = np.rint(heights.array * 65535).astype(np.uint16)
+        Image.fromarray(levels).save(tmp_path / f"{name}_height.png")
+        colour = np.rint((bw.bake(heights)["normal"] * 0.5 + 0.5) * 255).astype(np.uint8)
+        Image.fromarray(colour).save(tmp_path / f"{name}_normal.png")
+    Image.fromarray(colour).save(tmp_path / "wall_albedo.png")
+    (tmp_path / "notes.txt").write_text("no image")
+    sound = bw.lint(tmp_path)
+    assert codes(sound) == []
+    assert len(sound.checked) == 5
+    (tmp_path / "rock_normal.png").rename(tmp_path / "keep.png")
+    (tmp_path / "wall_normal.png").rename(tmp_path / "rock_normal.png")
+    assert codes(bw.lint(tmp_path)) == ["height-mismatch"]
+    assert codes(bw.lint(tmp_path / "keep.png")) == ["unknown-role"]
+
+
+def test_damaged_files_are_findings(tmp_path: Path) -> None:
+    for name in ("a_height.png", "a_normal.png", "a_cone.png", "a.obj"):
+        (tmp_path / name).write_bytes(b"\x89PNG\r\n\x1a\nnot really")
+    report = bw.lint(tmp_path)
+    assert codes(report) == ["unreadable"] * 4
+    data = json.loads(report.to_json(tmp_path / "lint.json").read_text())
+    assert len(data["findings"]) == 4
+    assert len(report.worse_than("error")) == 4
+    with pytest.raises(ValueError, match="severity"):
+        report.worse_than("fatal")  # type: ignore[arg-type]
+
+
+def test_senseless_calls_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="nothing to check"):
+        bw.lint()
+    with pytest.raises(FileNotFoundError, match="no file"):
+        bw.lint(tmp_path / "nowhere.png")
+    with pytest.raises(FileNotFoundError, match="no file"):
+        bw.lint(height=tmp_path / "nowhere.png")
+    with pytest.raises(TypeError, match="paths"):
+        bw.lint(np.zeros((4, 4)))  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="mesh"):
+        bw.lint(mesh=3)
+    with pytest.raises(ValueError, match="convention"):
+        bw.lint(height=[[0.5]], convention="vulkan")  # type: ignore[arg-type]
+
+
+def test_real_assets_get_real_findings(assets: Path) -> None:
+    rock = bw.lint(assets / "ambientcg" / "rock058")
+    assert {"lossy", "8-bit-heights"} <= set(codes(rock))
+    assert "wrong-green" not in codes(rock)
+    helmet = bw.lint(assets / "bevy" / "FlightHelmet" / "FlightHelmet.gltf")
+    assert "mirrored-seam-tangents" in codes(helmet)
