@@ -65,7 +65,7 @@ def legend(result: CompareResult) -> str:
         f'<span class="key"><i style="background:{color}"></i>{escape(name)}</span>'
         for name, color in colors(result).items()
     )
-    return f'<p class="legend">{names}<span class="key"><i class="hollow"></i>skips hits</span></p>'
+    return f'<p class="legend">{names}<span class="key"><i class="hollow"></i>fails</span></p>'
 
 
 def _axes(x: _Scale, y: _Scale, unit: str) -> list[str]:
@@ -110,7 +110,7 @@ def _marker(p: Point, color: str, x: _Scale, y: _Scale, unit: str) -> str:
     fill = color if p.reliable else "var(--page)"
     title = f"{p.label}: {p.time_ns:.4g} ns a {unit}, p99 {p.error_texels:.3g} texels"
     if not p.reliable:
-        title += ", skips hits"
+        title += ", fails"
     return (
         f"<g><title>{escape(title)}</title>"
         f'<path d="M{x(p.low_ns):.1f} {at_y:.1f}H{x(p.high_ns):.1f}" stroke="{color}" opacity="0.6"/>'

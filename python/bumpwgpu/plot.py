@@ -45,11 +45,11 @@ def plot(result: CompareResult, path: str | os.PathLike[str]) -> Path:
         axes.set_axis_off()
     where = "device" if result.timed_on == "device" else "CPU, all cores"
     figure.suptitle(
-        f"Time against error ({where}). Solid: settings worth having; dashed: if skipped hits did not matter",
+        f"Time against error ({where}). Solid: settings worth having; dashed: if failing rays did not matter",
         fontsize=11,
     )
     handles = [_marker(color, name) for name, color in palette.items()]
-    handles.append(_marker("#999999", "skips hits (over 0.1 % of rays)", filled=False))
+    handles.append(_marker("#999999", "fails on over 0.1 % of rays", filled=False))
     figure.legend(handles=handles, loc="lower center", ncols=min(len(handles), 6), fontsize=8, frameon=False)
     figure.tight_layout(rect=(0.0, 0.9 / (4.3 * rows + 1.0), 1.0, 0.98))
     figure.canvas.draw()

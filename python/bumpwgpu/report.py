@@ -21,6 +21,7 @@ from ._svg import chart, legend
 
 if TYPE_CHECKING:
     from .compare import CompareResult, Picture, Row
+    from .recommending import Recommendation
 
 __all__ = ["report"]
 
@@ -160,10 +161,16 @@ def _angle(elevation: Any) -> str:
 
 def _advice(result: CompareResult) -> str:
     lines = []
+    said: dict[tuple[Any, ...], tuple[list[str], Recommendation]] = {}
     for budget in (0.1, 0.5, 2.0):
         advice = result.recommend(budget)
+        # Equal advice for several budgets is given once, for the strictest.
+        key = (advice.technique, *advice.parameters.items(), advice.heights_format, advice.cones_format)
+        said.setdefault(key, ([], advice))[0].append(f"{budget:g}")
+    for budgets, advice in said.values():
         mark = "yes" if advice else "no"
-        lines.append(f'<li class="{mark}"><b>within {budget:g} texels</b> {escape(str(advice))}</li>')
+        within = " and ".join(filter(None, [", ".join(budgets[:-1]), budgets[-1]]))
+        lines.append(f'<li class="{mark}"><b>within {within} texels</b> {escape(str(advice))}</li>')
     ties = [
         f"{escape(row['label'])} and {escape(', '.join(row['tied_with']))}"
         for row in result.pareto()

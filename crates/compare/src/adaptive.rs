@@ -148,6 +148,7 @@ fn front_of(looks: &[Row]) -> Vec<usize> {
         .map(|row| Candidate {
             time: *time(row),
             error: row.metrics.uv_error_p99_texels,
+            memory: row.memory_bytes as f64,
             eligible: row.metrics.failure_rate() <= MOST_FAILING,
         })
         .collect();
@@ -163,6 +164,7 @@ fn around_the_front(looks: &[Row]) -> Vec<Setting> {
         .map(|row| Candidate {
             time: *time(row),
             error: row.metrics.uv_error_p99_texels,
+            memory: row.memory_bytes as f64,
             eligible: row.metrics.failure_rate() <= 20.0 * MOST_FAILING,
         })
         .collect();

@@ -9,6 +9,9 @@ pub struct Candidate {
     pub time: Timing,
     /// Error to trade against time, such as the 99th percentile in texels.
     pub error: f64,
+    /// What it needs besides, such as bytes of texture: of settings that are equal in both, the one that
+    /// needs least counts.
+    pub memory: f64,
     /// Whether it may be on the front at all: misses are a filter, not a trade.
     pub eligible: bool,
 }
@@ -17,10 +20,15 @@ pub struct Candidate {
 const ERROR_SLACK: f64 = 1.0e-3;
 
 /// Whether `a` makes `b` pointless: it is not slower beyond the spread, not less accurate, and clearly
-/// better in one of the two.
+/// better in one of the two, or equal in both with less memory.
 fn dominates(a: &Candidate, b: &Candidate) -> bool {
+    if b.time.clearly_faster(&a.time) {
+        return false;
+    }
     let more_accurate = a.error < b.error * (1.0 - ERROR_SLACK);
-    !b.time.clearly_faster(&a.time) && a.error <= b.error && (more_accurate || a.time.clearly_faster(&b.time))
+    let better = a.error <= b.error && (more_accurate || a.time.clearly_faster(&b.time));
+    let equal = a.error <= b.error * (1.0 + ERROR_SLACK) && !a.time.clearly_faster(&b.time);
+    better || equal && a.memory < b.memory
 }
 
 /// Indices on the Pareto front, by rising median time.
@@ -34,6 +42,13 @@ pub fn front(candidates: &[Candidate]) -> Vec<usize> {
         .collect();
     let by_time = |a: usize, b: usize| candidates[a].time.median_ns.total_cmp(&candidates[b].time.median_ns);
     order.sort_by(|&a, &b| candidates[a].error.total_cmp(&candidates[b].error).then(by_time(a, b)));
+    // An equal that needs less memory comes first, since only what was kept can keep others out.
+    let at = |i: usize| &candidates[i];
+    let spared = |i: usize| {
+        let equal = |j: usize| (at(j).error - at(i).error).abs() <= ERROR_SLACK * at(i).error;
+        order.iter().any(|&j| j != i && equal(j) && at(j).memory < at(i).memory && dominates(at(j), at(i)))
+    };
+    let order: Vec<usize> = order.iter().copied().filter(|&i| !spared(i)).collect();
     let mut front: Vec<usize> = Vec::new();
     for i in order {
         if !front.iter().any(|&kept| dominates(&candidates[kept], &candidates[i])) {
@@ -60,7 +75,7 @@ mod tests {
 
     fn candidate(time: f64, spread: f64, error: f64) -> Candidate {
         let time = Timing { median_ns: time, low_ns: time - spread, high_ns: time + spread };
-        Candidate { time, error, eligible: true }
+        Candidate { time, error, memory: 1.0, eligible: true }
     }
 
     #[test]
@@ -93,5 +108,7 @@ mod tests {
         assert_eq!(front(&chain), [0, 2], "the middle one is out, so it cannot keep the first one out");
         let equal = [candidate(1.00, 0.1, 1.0), candidate(1.05, 0.1, 1.0)];
         assert_eq!(front(&equal), [0, 1], "a tie in both stays a tie");
+        let small = [Candidate { memory: 0.5, ..equal[1] }, equal[0], candidate(9.0, 0.1, 0.1)];
+        assert_eq!(front(&small), [0, 2], "unless one needs less memory");
     }
 }

@@ -67,8 +67,11 @@ pub struct Advice {
     pub reason: String,
 }
 
+/// Errors closer than this share are equal.
+const ERROR_SLACK: f64 = 1.0e-3;
+
 /// Picks the cheapest entry within the budget. Among those that time cannot tell apart from the
-/// cheapest, the most accurate wins.
+/// cheapest, the most accurate wins, and among equally accurate ones the smallest.
 pub fn recommend(entries: &[Entry], budget: &Budget) -> Advice {
     let affordable: Vec<usize> = (0..entries.len()).filter(|&i| budget.affords(&entries[i])).collect();
     let reliable: Vec<usize> =
@@ -87,6 +90,13 @@ pub fn recommend(entries: &[Entry], budget: &Budget) -> Advice {
         .copied()
         .min_by(|&a, &b| entries[a].error_texels.total_cmp(&entries[b].error_texels))
         .unwrap_or(fastest);
+    let equal = |i: usize| entries[i].error_texels <= entries[pick].error_texels * (1.0 + ERROR_SLACK);
+    let pick = rivals
+        .iter()
+        .copied()
+        .filter(|&i| equal(i))
+        .min_by(|&a, &b| entries[a].memory_bytes.total_cmp(&entries[b].memory_bytes))
+        .unwrap_or(pick);
     let chosen = &entries[pick];
     let rank = if within.len() == 1 {
         "the only setting".to_owned()
@@ -108,9 +118,10 @@ pub fn recommend(entries: &[Entry], budget: &Budget) -> Advice {
         rivals.iter().filter(|&&i| i != pick).map(|&i| entries[i].label.as_str()).collect();
     if !others.is_empty() {
         reason.push_str(&format!(
-            " Its time cannot be told from that of {}, which {} less accurate.",
+            " Its time cannot be told from that of {}, which {} no more accurate{}.",
             others.join(", "),
-            if others.len() == 1 { "is" } else { "are" }
+            if others.len() == 1 { "is" } else { "are" },
+            if rivals.iter().any(|&i| i != pick && equal(i)) { " or larger" } else { "" }
         ));
     }
     Advice { pick: Some(pick), reason }
@@ -206,6 +217,10 @@ mod tests {
         let tight = recommend(&all, &Budget { max_memory_bytes: 1024.0, ..BUDGET });
         assert!(tight.pick.is_none() && tight.reason.contains("slow, 4 KiB"), "{}", tight.reason);
         assert_eq!(Budget::of_errors(0.5, 1e-3), BUDGET);
+        let small = Entry { memory_bytes: 9.0, ..entry("small", 9.1, 0.5, 0.1, 0.0) };
+        let advice = recommend(&[entry("slow", 9.0, 0.5, 0.1, 0.0), small], &BUDGET);
+        assert_eq!(advice.pick, Some(1));
+        assert!(advice.reason.contains("no more accurate or larger"), "{}", advice.reason);
     }
 
     #[test]

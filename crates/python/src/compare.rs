@@ -76,7 +76,6 @@ impl Reporter {
 /// there is one.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "one flat call from the Python facade")]
-#[expect(clippy::type_complexity, reason = "three results, named in the facade")]
 pub fn compare_planar<'py>(
     py: Python<'py>,
     field: &Field,
@@ -368,9 +367,10 @@ fn timing([low_ns, median_ns, high_ns]: [f64; 3]) -> Timing {
 pub fn compare_front(measured: Vec<Measured>, max_failure_rate: f64) -> Vec<(usize, Vec<usize>)> {
     let candidates: Vec<Candidate> = measured
         .into_iter()
-        .map(|(_, time, error, failure_rate, _)| Candidate {
+        .map(|(_, time, error, failure_rate, memory)| Candidate {
             time: timing(time),
             error,
+            memory,
             eligible: failure_rate <= max_failure_rate,
         })
         .collect();

@@ -15,7 +15,6 @@ type Column<'py> = Bound<'py, PyArray1<f64>>;
 /// tell), height of the reported point above the surface, depth of what was skipped before it, and the height
 /// change a unit of the ray parameter there.
 #[pyfunction]
-#[expect(clippy::type_complexity, reason = "four columns, named in the facade")]
 pub fn judge<'py>(
     py: Python<'py>,
     heights: PyReadonlyArray2<'py, f32>,
