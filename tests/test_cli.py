@@ -226,7 +226,6 @@ def test_compare_fails_above_a_limit(folder: Path) -> None:
         "1",
         "--device",
         "cpu",
-        "--techniques",
     ]
     sound = run(*words, "--techniques", "exact", "--fail-above", 0.1, cwd=folder)
     assert sound.returncode == 0, sound.stderr

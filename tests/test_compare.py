@@ -571,6 +571,32 @@ def test_scene_errors_rank_the_techniques(scene_result: bw.CompareResult) -> Non
 
 
 @pytest.mark.gpu
+def test_a_camera_path_counts_all_of_its_pixels(scene: bw.Scene) -> None:
+    aside = bw.Camera.look_at((0.5, -0.9, 0.5), (0.0, 0.0, 0.0), fov_y=40.0)
+
+    def compared(*cameras: bw.Camera) -> bw.CompareResult:
+        path = bw.Scene(scene.mesh, scene.material, cameras, scene.lights, (64, 48))
+        return bw.compare(path, ["relief", "exact"], elevations=(60, 30, 15), repeats=2)
+
+    assert isinstance(scene.camera, bw.Camera)
+    first, second = compared(scene.camera), compared(aside)
+    both = compared(scene.camera, aside)
+    assert both.environment["cameras"] == 2
+    for name in ("relief", "exact"):
+        rows = [row_of(made, name) for made in (first, second, both)]
+        assert rows[2]["rays"] == rows[0]["rays"] + rows[1]["rays"]
+        worst = [row["uv_error_max_texels"] for row in rows]
+        assert worst[2] == max(worst[:2])
+        assert rows[2]["regions"].keys() == {"interior", "silhouette", "shadow"}
+        for key in ("silhouette", "shadow"):
+            parts = [row["regions"][key]["rays"] for row in rows]
+            assert parts[2] == parts[0] + parts[1]
+    advice = both.recommend(0.5)
+    assert advice.technique in ("exact", "relief")
+    assert advice.verified_rays > both.select("all")[0]["rays"]
+
+
+@pytest.mark.gpu
 def test_a_scene_makes_a_report_too(scene_result: bw.CompareResult, tmp_path: Path) -> None:
     text = scene_result.report(tmp_path / "scene.html").read_text()
     assert "FLIP" in text or "SSIM" in text
@@ -605,6 +631,10 @@ def test_scenes_are_checked(scene: bw.Scene) -> None:
         bw.Scene(scene.mesh, bw.Material(), scene.camera)
     with pytest.raises(TypeError, match="camera"):
         bw.Scene(scene.mesh, scene.material, (0, 0, 3))  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="camera path is empty"):
+        bw.Scene(scene.mesh, scene.material, ())
+    with pytest.raises(ValueError, match="formats"):
+        bw.compare(scene, "exact", formats=["r8unorm"])
     with pytest.raises(TypeError, match="lights"):
         bw.Scene(scene.mesh, scene.material, scene.camera, [(0, 0, -1)])  # type: ignore[list-item]
     with pytest.raises(TypeError, match="material"):

@@ -3,23 +3,43 @@
 from __future__ import annotations
 
 import inspect
-import json
-import math
 import sys
-import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from enum import Enum
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from . import __version__, techniques
+from . import __version__
 from ._atomic import replace_file
+from ._cli_checks import lint, stress
+from ._cli_tools import (
+    CHECK_FAILED,
+    DeviceChoice,
+    WrapChoice,
+    _Base,
+    _Channel,
+    _channel,
+    _check_suffix,
+    _Invert,
+    _Json,
+    _names,
+    _numbers,
+    _Output,
+    _Quiet,
+    _Range,
+    _range,
+    _Scale,
+    _session,
+    _technique,
+    _techniques,
+    _Tile,
+    _usage,
+    _Verbose,
+    _WrapOption,
+)
 from ._map_info import MAPS as MAP_INFO
 from ._map_info import OPTIONS, MapOption
 from .baking import MAPS
@@ -28,17 +48,13 @@ from .baking import bake_file as bake_map_file
 from .compare import ELEVATIONS, FORMATS, Scene, advice_dict
 from .compare import compare as compare_techniques
 from .engines import ENGINES
-from .errors import BumpError
-from .frames import TANGENT_METHODS
 from .heightmap import HeightMap
-from .lint import lint as lint_sources
 from .mesh_maps import MESH_MAPS, MeshMaps
 from .meshes import Mesh
 from .recommending import LANGUAGES
 from .rendering import AOVS
 from .rendering import render as render_frame
 from .scene import Camera, Light, Material
-from .stress import stress as stress_everything
 from .system import info as system_info
 
 __all__ = ["app", "main"]
@@ -60,17 +76,6 @@ _MESHES: dict[str, Callable[[], Mesh]] = {
 }
 _MESH_SUFFIXES = (".obj", ".gltf", ".glb")
 _SHADERS = tuple(f".{language}" for language in LANGUAGES)
-#: What a command ends with when it ran and what it checked did not hold.
-CHECK_FAILED = 3
-_T = TypeVar("_T")
-
-
-class WrapChoice(Enum):
-    """Values of --wrap."""
-
-    REPEAT = "repeat"
-    CLAMP = "clamp"
-    MIRROR = "mirror"
 
 
 class FormatChoice(Enum):
@@ -95,183 +100,6 @@ class SpaceChoice(Enum):
 
     TANGENT = "tangent"
     OBJECT = "object"
-
-
-class ConventionChoice(Enum):
-    """Values of --convention."""
-
-    OPENGL = "opengl"
-    DIRECTX = "directx"
-
-
-class SeverityChoice(Enum):
-    """Values of --fail-on."""
-
-    ERROR = "error"
-    WARNING = "warning"
-    INFO = "info"
-
-
-class DeviceChoice(Enum):
-    """Values of --device."""
-
-    AUTO = "auto"
-    CPU = "cpu"
-    GPU = "gpu"
-
-
-# Options that several commands share.
-_Scale = Annotated[float, typer.Option(help="Height range, mesh units.", min=0.0)]
-_Base = Annotated[
-    float, typer.Option(help="Height that lies on the mesh: 1 carves in, 0 raises.", min=0.0, max=1.0)
-]
-_Tile = Annotated[tuple[float, float], typer.Option(help="Mesh units covered by one tile along u and v.")]
-_WrapOption = Annotated[WrapChoice, typer.Option(help="What lies beyond the edge.")]
-_Channel = Annotated[
-    str | None, typer.Option(help="Channel with the heights: r, g, b, a, an index, or an EXR name.")
-]
-_Invert = Annotated[bool, typer.Option("--invert", help="The map holds depth: 1 is low.")]
-_Range = Annotated[
-    str | None,
-    typer.Option(help="What becomes height 0 and 1: 'auto' or 'low,high', in the units of the data."),
-]
-_Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON and nothing else.")]
-_Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Print errors only.")]
-_Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print more; on errors, a traceback.")]
-
-
-class _Output:
-    """Where results, warnings and progress go: results to stdout, all else to stderr."""
-
-    def __init__(self, json_wanted: bool, quiet: bool, verbose: bool) -> None:
-        self.json = json_wanted
-        self.quiet = quiet
-        self.verbose = verbose
-        self.out = Console(soft_wrap=True, highlight=False)
-        self.err = Console(stderr=True, soft_wrap=True, highlight=False)
-
-    def say(self, text: str) -> None:
-        if not (self.json or self.quiet):
-            self.out.print(text, markup=False)
-
-    def show(self, table: Table) -> None:
-        if not (self.json or self.quiet):
-            self.out.print(table)
-
-    def result(self, data: dict[str, Any]) -> None:
-        if self.json:
-            sys.stdout.write(json.dumps(data, indent=1, allow_nan=False, default=str) + "\n")
-
-    def warn(self, text: str) -> None:
-        if not self.quiet:
-            self.err.print(f"warning: {text}", markup=False)
-
-    @contextmanager
-    def progress(self, text: str) -> Iterator[Callable[..., None]]:
-        """A progress bar on stderr, for people only: none with -q or where stderr is no terminal."""
-        bar = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TaskProgressColumn(),
-            TimeElapsedColumn(),
-            console=self.err,
-            transient=True,
-            disable=self.quiet or not self.err.is_terminal,
-        )
-        with bar:
-            task = bar.add_task(text, total=None)
-
-            def advance(done: int, total: int, now: str = text) -> None:
-                bar.update(task, completed=done, total=total, description=now)
-
-            yield advance
-
-
-@contextmanager
-def _session(json_wanted: bool, quiet: bool, verbose: bool) -> Iterator[_Output]:
-    """Turns warnings into lines and exceptions into one line and an exit code."""
-    output = _Output(json_wanted, quiet, verbose)
-    with warnings.catch_warnings():
-        warnings.simplefilter("always")
-        warnings.showwarning = lambda message, *_args, **_kwargs: output.warn(str(message))
-        try:
-            yield output
-        except KeyboardInterrupt:
-            output.err.print("interrupted", markup=False)
-            raise typer.Exit(130) from None
-        except (BumpError, OSError, ValueError, TypeError, MemoryError) as error:
-            if verbose:
-                output.err.print_exception()
-            lines = str(error).split("\n")
-            output.err.print(f"error: {lines[0] or type(error).__name__}", markup=False)
-            raise typer.Exit(1) from None
-
-
-def _usage(check: Callable[..., _T], *arguments: Any, **options: Any) -> _T:
-    """Calls a check of options; what it finds wrong is a usage error."""
-    try:
-        return check(*arguments, **options)
-    except (ValueError, TypeError) as error:
-        raise typer.BadParameter(str(error)) from None
-
-
-def _names(text: str, known: tuple[str, ...], what: str) -> list[str]:
-    names = [name.strip() for name in text.split(",") if name.strip()]
-    for name in names:
-        if name not in known:
-            raise typer.BadParameter(f"unknown {what} {name!r}; known: {', '.join(known)}")
-    return names
-
-
-def _numbers(text: str, what: str, count: int | None = None) -> tuple[float, ...]:
-    try:
-        values = tuple(float(part) for part in text.split(","))
-    except ValueError:
-        raise typer.BadParameter(f"{what} must be numbers with commas between, got {text!r}") from None
-    if count is not None and len(values) != count:
-        raise typer.BadParameter(f"{what} must be {count} numbers with commas between, got {text!r}")
-    return values
-
-
-def _technique(text: str) -> techniques.Technique:
-    """``relief`` or ``relief(linear=16, refine=4)``."""
-    name, bracket, rest = text.strip().partition("(")
-    chosen = _usage(techniques.get, name.strip())
-    if not bracket:
-        return chosen
-    parameters: dict[str, int] = {}
-    for part in rest.rstrip().removesuffix(")").split(","):
-        key, _, value = part.partition("=")
-        try:
-            parameters[key.strip()] = int(value)
-        except ValueError:
-            raise typer.BadParameter(f"technique {text!r}: write {name}(parameter=number)") from None
-    return _usage(type(chosen), **parameters)
-
-
-def _techniques(text: str) -> list[techniques.Technique]:
-    """Several of the above; commas inside brackets belong to the parameters."""
-    parts, depth = [""], 0
-    for letter in text:
-        depth += {"(": 1, ")": -1}.get(letter, 0)
-        if letter == "," and depth == 0:
-            parts.append("")
-        else:
-            parts[-1] += letter
-    return [_technique(part) for part in parts if part.strip()]
-
-
-def _channel(text: str | None) -> int | str | None:
-    return int(text) if text is not None and text.isdigit() else text
-
-
-def _range(text: str | None) -> Any:
-    return text if text in (None, "auto") else _numbers(text, "--height-range", 2)
-
-
-def _check_suffix(path: Path, known: tuple[str, ...]) -> None:
-    if path.suffix.lower() not in known:
-        raise typer.BadParameter(f"{path.name!r} must end in one of {', '.join(known)}")
 
 
 def _map_option(name: str, text: str) -> Any:
@@ -799,181 +627,8 @@ def _table(rows: list[dict[str, Any]], timed_on: str) -> Table:
     return table
 
 
-@app.command()
-def stress(
-    technique_list: Annotated[
-        str, typer.Option("--techniques", help="Searches, with commas between; none.", show_default="all")
-    ] = "",
-    maps: Annotated[
-        str, typer.Option(help="Maps to bake, with commas between; none.", show_default="all")
-    ] = "",
-    frames: Annotated[
-        str, typer.Option(help="Tangent methods, with commas between; none.", show_default="all")
-    ] = "",
-    only: Annotated[str | None, typer.Option(help="Only cases whose group or name contains this.")] = None,
-    gpu: Annotated[bool, typer.Option("--gpu", help="Run searches on the device.")] = False,
-    rays: Annotated[int, typer.Option(help="Rays of a case.", min=8, max=65536)] = 128,
-    seed: Annotated[int, typer.Option(help="Fixes rays and maps.", min=0)] = 0,
-    rows: Annotated[Path | None, typer.Option(help="Write all rows: .json or .csv.")] = None,
-    plot: Annotated[
-        Path | None, typer.Option(help="Plot error against angle and offset (.png, .svg, .pdf).")
-    ] = None,
-    json_output: _Json = False,
-    quiet: _Quiet = False,
-    verbose: _Verbose = False,
-) -> None:
-    """Try searches, bakes and tangent frames on what breaks them; exit with 3 if something fails."""
-    chosen = [] if technique_list == "none" else _techniques(technique_list) or None
-    baked = [] if maps == "none" else _names(maps, MAPS, "map") or None
-    methods = [] if frames == "none" else _names(frames, tuple(TANGENT_METHODS), "method") or None
-    for path, known in ((plot, (".png", ".svg", ".pdf")), (rows, (".json", ".csv"))):
-        if path is not None:
-            _check_suffix(path, known)
-    with _session(json_output, quiet, verbose) as out:
-        with out.progress("stress") as advance:
-            result = stress_everything(
-                chosen,
-                maps=baked,
-                frames=methods,
-                only=only,
-                device="gpu" if gpu else "cpu",
-                rays=rays,
-                seed=seed,
-                progress=advance,
-            )
-        files = []
-        if rows is not None:
-            files.append(result.to_csv(rows) if rows.suffix.lower() == ".csv" else result.to_json(rows))
-        if plot is not None:
-            files.append(result.plot(plot))
-        summary = result.summary()
-        out.show(_stress_table(summary if verbose else _worst_of_subjects(summary)))
-        out.say(f"{len(result.rows)} checks, {len(result.failures)} failed")
-        for path in files:
-            out.say(str(path))
-        out.result(
-            {
-                "passed": bool(result),
-                "checks": len(result.rows),
-                "failures": [_jsonable(row) for row in result.failures],
-                "summary": [_jsonable(row) for row in summary],
-                "environment": result.environment,
-                "files": files,
-            }
-        )
-        if not result:
-            raise typer.Exit(CHECK_FAILED)
-
-
-def _worst_of_subjects(summary: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """What failed, and of each subject what came nearest to its limit."""
-
-    def severity(row: dict[str, Any]) -> float:
-        return float(row["worst"] / row["limit"]) if 0.0 < row["limit"] < float("inf") else 0.0
-
-    kept: dict[str, dict[str, Any]] = {}
-    for row in summary:
-        if row["subject"] not in kept or severity(row) > severity(kept[row["subject"]]):
-            kept[row["subject"]] = row
-    failed = [row for row in summary if not row["passed"]]
-    return [*failed, *(row for row in kept.values() if row["passed"])]
-
-
-def _jsonable(row: dict[str, Any]) -> dict[str, Any]:
-    """Infinite numbers as None."""
-    return {
-        name: None if isinstance(value, float) and not math.isfinite(value) else value
-        for name, value in row.items()
-    }
-
-
-def _stress_table(rows: list[dict[str, Any]]) -> Table:
-    table = Table(title="worst of each check")
-    for heading in ("", "subject", "group", "check"):
-        table.add_column(heading)
-    for heading in ("worst", "limit"):
-        table.add_column(heading, justify="right")
-    for heading in ("unit", "where"):
-        table.add_column(heading)
-    for row in rows:
-        where = f"{row['case']}: {row['where']}" if row["where"] else row["case"]
-        table.add_row(
-            "pass" if row["passed"] else "FAIL",
-            row["subject"],
-            row["group"],
-            row["check"],
-            f"{row['worst']:.3g}",
-            "-" if row["limit"] == float("inf") else f"{row['limit']:.3g}",
-            row["unit"],
-            where,
-        )
-    return table
-
-
-@app.command()
-def lint(
-    sources: Annotated[
-        list[Path] | None,
-        typer.Argument(help="Files and folders; names say what they hold, such as rock_normal.png."),
-    ] = None,
-    height: Annotated[Path | None, typer.Option(help="A height map, whatever its name.")] = None,
-    normal: Annotated[Path | None, typer.Option(help="A normal map.")] = None,
-    cone: Annotated[Path | None, typer.Option(help="A cone map.")] = None,
-    relaxed_cone: Annotated[Path | None, typer.Option(help="A relaxed cone map.")] = None,
-    mesh: Annotated[Path | None, typer.Option(help="A mesh: OBJ, glTF or GLB.")] = None,
-    convention: Annotated[
-        ConventionChoice, typer.Option(help="Which way green should point.")
-    ] = ConventionChoice.OPENGL,
-    wrap: _WrapOption = WrapChoice.REPEAT,
-    scale: Annotated[
-        float | None, typer.Option(help="Depth of the relief, mesh units, to hold normals against.", min=0.0)
-    ] = None,
-    tile_size: _Tile = (1.0, 1.0),
-    invert: Annotated[
-        bool | None,
-        typer.Option("--invert/--no-invert", help="Height maps hold depths.", show_default="by name"),
-    ] = None,
-    fail_on: Annotated[
-        SeverityChoice, typer.Option(help="Exit with 3 if there is a finding as bad as this.")
-    ] = SeverityChoice.ERROR,
-    json_output: _Json = False,
-    quiet: _Quiet = False,
-    verbose: _Verbose = False,
-) -> None:
-    """Find what breaks materials: green channels, 8-bit heights, seams, cones that cut the surface, UVs."""
-    given = [*(sources or []), height, normal, cone, relaxed_cone, mesh]
-    if not any(given):
-        raise typer.BadParameter(
-            "nothing to check: give files, folders, --height, --normal, --cone or --mesh"
-        )
-    with _session(json_output, quiet, verbose) as out:
-        report = lint_sources(
-            *(sources or []),
-            height=height,
-            normal=normal,
-            cone=cone,
-            relaxed_cone=relaxed_cone,
-            mesh=mesh,
-            convention=convention.value,
-            wrap=wrap.value,
-            scale=scale,
-            tile_size=tile_size,
-            invert=invert,
-        )
-        if verbose:
-            for name in report.checked:
-                out.say(name)
-        out.say(str(report))
-        bad = report.worse_than(fail_on.value)
-        out.result(
-            {
-                "checked": report.checked,
-                "findings": [finding._asdict() for finding in report.findings],
-                "failed": bool(bad),
-            }
-        )
-        if bad:
-            raise typer.Exit(CHECK_FAILED)
+app.command()(stress)
+app.command()(lint)
 
 
 @app.command()
