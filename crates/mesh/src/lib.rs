@@ -7,13 +7,14 @@
 //! [`Mesh::open`] reads OBJ, glTF and GLB; [`Mesh::quad`], [`Mesh::cube`], [`Mesh::sphere`] and
 //! [`Mesh::torus`] generate shapes whose derivatives are exact; [`Mesh::from_arrays`] takes plain
 //! arrays. [`tangents`] alone turns arrays into arrays. [`bake_detail`] makes maps of a detailed mesh on the
-//! UVs of a plain one.
+//! UVs of a plain one, and [`displace()`] the way back: micro-polygons from a height.
 //!
 //! Readers answer bad files with a [`MeshError`]. What could be repaired or had to be left out is
 //! listed in [`Mesh::warnings`].
 
 pub mod arrays;
 pub mod detail;
+pub mod displace;
 pub mod error;
 pub mod frame;
 pub mod generate;
@@ -27,6 +28,7 @@ mod obj;
 pub use detail::{
     DetailMaps, DetailOptions, DetailReport, NormalSpace, SkyOptions, bake_detail, tangent_map,
 };
+pub use displace::{Cut, Displaced, EdgeSide, Relief, displace};
 pub use error::MeshError;
 pub use frame::{Derivatives, FrameMethod, Split, derivatives, normal_derivatives, tangents};
 pub use material::{ImageSource, MaterialSource};

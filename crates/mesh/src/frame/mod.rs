@@ -16,7 +16,7 @@ mod metric;
 mod mikktspace;
 mod split;
 mod uv_gradient;
-mod weld;
+pub(crate) mod weld;
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use rayon::prelude::*;

@@ -6,7 +6,7 @@ use hashbrown::{DefaultHashBuilder, HashTable};
 use rayon::prelude::*;
 
 /// For each of `count` things, the first one with the same key.
-pub(super) fn first_equal<const W: usize>(count: usize, key: impl Fn(usize) -> [u32; W] + Sync) -> Vec<u32> {
+pub(crate) fn first_equal<const W: usize>(count: usize, key: impl Fn(usize) -> [u32; W] + Sync) -> Vec<u32> {
     let hasher = DefaultHashBuilder::default();
     let hashes: Vec<u64> = (0..count).into_par_iter().map(|i| hasher.hash_one(key(i))).collect();
     let mut table: HashTable<u32> = HashTable::with_capacity(count);

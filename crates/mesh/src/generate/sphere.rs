@@ -12,6 +12,8 @@ use crate::mesh::Mesh;
 /// The sphere of [`Mesh::sphere`] in closed form. `u` is longitude, `v` colatitude over half a turn.
 pub fn sphere_point(radius: f64, u: f64, v: f64) -> SurfacePoint {
     let ((sin_lon, cos_lon), (sin_lat, cos_lat)) = ((TAU * (u - 0.5)).sin_cos(), (PI * v).sin_cos());
+    // The south pole is one point, to the last bit.
+    let sin_lat = if v == 1.0 { 0.0 } else { sin_lat };
     let along = DVec3::new(cos_lon, 0.0, -sin_lon);
     let normal = DVec3::new(sin_lat * sin_lon, cos_lat, sin_lat * cos_lon);
     let dndu = TAU * sin_lat * along;
@@ -44,7 +46,8 @@ impl Mesh {
         let columns = check_segments("segments", segments)?;
         let rows = (columns / 2).max(2);
         let mut mesh = Self::default();
-        let mut push = |u: f64, v: f64| mesh.push_exact([u, v], &sphere_point(radius, u, v));
+        // The last column is the first one again, to the last bit, so that the seam is closed.
+        let mut push = |u: f64, v: f64| mesh.push_exact([u, v], &sphere_point(radius, u % 1.0, v));
         let (du, dv) = (1.0 / f64::from(columns), 1.0 / f64::from(rows));
         for row in 1..rows {
             for column in 0..=columns {

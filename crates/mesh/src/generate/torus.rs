@@ -58,7 +58,8 @@ impl Mesh {
         for row in 0..=rows {
             for column in 0..=columns {
                 let (u, v) = (f64::from(column) / f64::from(columns), f64::from(row) / f64::from(rows));
-                mesh.push_exact([u, v], &torus_point(ring, tube, u, v));
+                // The last row and column are the first ones again, to the last bit, so that seams are closed.
+                mesh.push_exact([u, v], &torus_point(ring, tube, u % 1.0, v % 1.0));
             }
         }
         for row in 0..rows {

@@ -1,0 +1,36 @@
+// Micro-polygons of a displaced mesh: surface/displaced, surface/tangent.
+#import "lib/surface_height.wgsl"
+#import "shading/gather.wgsl"
+#import "shading/shade.wgsl"
+#import "shading/shadow_none.wgsl"
+
+struct VertexIn {
+    @location(0) position: vec3f,
+    @location(8) face: u32,
+    @location(9) weights: vec2f,
+}
+
+struct Varyings {
+    @builtin(position) clip: vec4f,
+    @location(0) position: vec3f,
+    @location(8) @interpolate(flat, first) face: u32,
+    @location(9) weights: vec2f,
+}
+
+@vertex
+fn vertex(in: VertexIn) -> Varyings {
+    let clip = frame.clip_from_relative * vec4f(relative_position(in.position), 1.0);
+    return Varyings(clip, in.position, in.face, in.weights);
+}
+
+@fragment
+fn fragment(in: Varyings, @builtin(front_facing) front: bool) -> Targets {
+    var point = facing(gathered(in.face, in.weights), front);
+    point = with_footprint(point, in.position);
+    point.height = surface_height(point.uv);
+    let albedo = albedo_at(point.uv, point.uv_dx, point.uv_dy);
+    let shadow = ShadowPoint(point.surface, vec3f(point.uv, point.height));
+    var shaded = shade_mesh(in.position, shading_normal(point), point.uv, albedo, shadow);
+    shaded.place.w = point.height;
+    return targets(shaded);
+}
