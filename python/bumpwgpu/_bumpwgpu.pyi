@@ -309,6 +309,7 @@ def render(
     size: tuple[int, int],
     shadows: bool | None,
     horizon: tuple[int, float] | None,
+    silhouettes: bool,
     aovs: Sequence[str],
 ) -> _RenderResult: ...
 def save_map(

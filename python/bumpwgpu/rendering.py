@@ -200,6 +200,7 @@ def render(
     technique: str | Technique = "relief",
     size: int | tuple[int, int] = (512, 512),
     shadows: bool | Literal["horizon"] | HorizonShadows | None = None,
+    silhouettes: bool = False,
     aovs: str | Iterable[str] = (),
     device: str = "auto",
     ambient: float | tuple[float, float, float] = 0.1,
@@ -225,6 +226,11 @@ def render(
         Whether the relief shadows itself, by the technique's own search towards each light. None:
         where the technique can. "horizon" looks shadows up in a baked horizon map instead, also for
         "bump" and "normal", which cast none; :class:`HorizonShadows` chooses its size and softness.
+    silhouettes : bool, default False
+        Trace rays through the shell around the mesh in which the relief lies, instead of bending the
+        texture on its surface: outlines, depth, intersections and shadows are then those of
+        ``technique="displacement"``, also on curved meshes, across seams and with the camera inside the
+        shell. For ``technique="exact"``; on the others it has no effect, and a warning says so.
     aovs : str or iterable of str
         Additional outputs, (H, W) or (H, W, C): "uv" (unwrapped), "depth" (along the view axis, mesh
         units, inf where nothing is), "position", "normal" (world axes), "height" (0..1), "steps",
@@ -288,6 +294,7 @@ def render(
         list(chosen.parameters.items()),
         (width, height),
         *_shadows(shadows),
+        flag("silhouettes", silhouettes),
         outputs,
     )
     texts = list(result["warnings"])

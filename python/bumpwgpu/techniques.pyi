@@ -12,6 +12,7 @@ __all__ = [
     "BumpOrthogonal",
     "Cone",
     "ConeTexel",
+    "Displacement",
     "Distance",
     "Dot3",
     "Exact",
@@ -82,6 +83,9 @@ class Normal(Technique):
     def __init__(self) -> None: ...
 
 class Dot3(Technique):
+    def __init__(self) -> None: ...
+
+class Displacement(Technique):
     def __init__(self) -> None: ...
 
 class Parallax(Technique):

@@ -7,4 +7,6 @@ struct DrawInfo {
     eye: vec4f,                      // camera, object space
 }
 
-@group(3) @binding(0) var<uniform> draw: DrawInfo;
+// A storage buffer: Mesa 22.3 crashes over loops whose ends depend on a matrix in a uniform, as those do that trace
+// rays in object space (lavapipe's inlining of uniforms).
+@group(3) @binding(0) var<storage, read> draw: DrawInfo;

@@ -5,6 +5,9 @@ struct FrameInfo {
     clip_from_relative: mat4x4f,
     forward: vec4f,        // unit view axis; w: near plane, world units
     ambient: vec4f,        // rgb, linear light
+    corner: vec4f,         // through the picture's upper left corner, world axes; 1 along the view axis
+    pixel_right: vec4f,    // how that changes from one pixel to the next
+    pixel_down: vec4f,     // and from one row to the next
     light_count: u32,
     pad_0: u32,
     pad_1: u32,

@@ -2,7 +2,7 @@
 #import "lib/surface_height.wgsl"
 #import "shading/gather.wgsl"
 #import "shading/shade.wgsl"
-#import "shading/shadow_none.wgsl"
+#import "shading/shadow_shell.wgsl"
 
 struct VertexIn {
     @location(0) position: vec3f,
@@ -29,7 +29,8 @@ fn fragment(in: Varyings, @builtin(front_facing) front: bool) -> Targets {
     point = with_footprint(point, in.position);
     point.height = surface_height(point.uv);
     let albedo = albedo_at(point.uv, point.uv_dx, point.uv_dy);
-    let shadow = ShadowPoint(point.surface, vec3f(point.uv, point.height));
+    let on_surface = displaced_position(in.face, in.weights, point.height);
+    let shadow = ShadowPoint(point.surface, vec3f(point.uv, point.height), on_surface);
     var shaded = shade_mesh(in.position, shading_normal(point), point.uv, albedo, shadow);
     shaded.place.w = point.height;
     return targets(shaded);

@@ -37,7 +37,8 @@ fn maximum_of(raw: vec2i, bits: vec2i, offset_bits: i32) -> f32 {
     return pyramid[offset + (id.y << u32(bits.x)) + id.x];
 }
 
-fn trace(start: vec3f, delta: vec3f, from_surface: bool) -> Found {
+// bounded: whether the segment ends at its end; otherwise it goes on to the surface below.
+fn trace(start: vec3f, delta: vec3f, from_surface: bool, bounded: bool) -> Found {
     let period = vec2f(height_info.cells);
     let place = start.xy * height_info.size - 0.5;
     let first_cell = floor(place);
@@ -72,8 +73,15 @@ fn trace(start: vec3f, delta: vec3f, from_surface: bool) -> Found {
     if from_surface {
         let gap = cell_ray(corners_of(first_cell), local_start, z_start, 0.0, vec3f(direction, dz)).gap;
         z_start -= select(0.0, gap, abs(gap) <= ON_SURFACE);
-        end = min(end, 1.0);
         depth = deepest;
+    }
+    if from_surface || bounded {
+        end = min(end, 1.0);
+    }
+    if bounded {
+        // Nodes about as wide as the segment is long.
+        let cells = max(abs(direction.x), abs(direction.y));
+        depth = clamp(deepest - i32(log2(max(cells, 1.0))), depth, deepest);
     }
     // Nodes are left out only when the ray clears them by more than rounding.
     let z_skip = z_start - ROUNDING;
@@ -144,7 +152,7 @@ fn trace(start: vec3f, delta: vec3f, from_surface: bool) -> Found {
         }
     }
     // What lies beyond the light throws no shadow.
-    if hit && (t <= end || !from_surface) {
+    if hit && (t <= end || !(from_surface || bounded)) {
         return found_hit(t, steps);
     }
     if steps >= MAX_STEPS {
@@ -154,9 +162,19 @@ fn trace(start: vec3f, delta: vec3f, from_surface: bool) -> Found {
 }
 
 fn search(start: vec3f, delta: vec3f, cos_theta: f32) -> Found {
-    return trace(start, delta, false);
+    return trace(start, delta, false, false);
 }
 
 fn occluded(start: vec3f, delta: vec3f, cos_theta: f32) -> bool {
-    return trace(start, delta, true).status == 0u;
+    return trace(start, delta, true, false).status == 0u;
+}
+
+// As search, for a segment that may begin and end anywhere.
+fn search_within(start: vec3f, delta: vec3f) -> Found {
+    return trace(start, delta, false, true);
+}
+
+// The same for one that begins on the surface and leaves it.
+fn search_away_within(start: vec3f, delta: vec3f) -> Found {
+    return trace(start, delta, true, true);
 }

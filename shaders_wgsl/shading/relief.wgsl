@@ -2,19 +2,9 @@
 #import "lib/found.wgsl"
 #import "lib/texture_ray.wgsl"
 #import "shading/shadow_search.wgsl"
+#import "shading/relief_targets.wgsl"
 #import "shading/shade.wgsl"
 #import "lib/surface_point.wgsl"
-
-struct ReliefTargets {
-    @location(0) color: vec4f,
-    @location(1) trace: u32,
-    @location(2) place: vec4f,
-    @location(3) position: vec4f,
-    @location(4) normal: vec4f,
-    @location(5) ray_start: vec4f,
-    @location(6) ray_delta: vec4f,
-    @builtin(frag_depth) depth: f32,
-}
 
 // Shadow rays start this much above the hit, in heights: one step of a 16-bit map. What is left of
 // rounding in the hit then cannot put them below the surface of the next cell.
@@ -35,7 +25,7 @@ fn shade_relief(position: vec3f, point: SurfacePoint) -> ReliefTargets {
     let normal = world_normal(shading_normal(at_hit));
     let albedo = albedo_at(hit.xy, point.uv_dx, point.uv_dy);
     let relative = relative_position(hit_position);
-    let light = lit(albedo.rgb, relative, normal, ShadowPoint(point.surface, hit + vec3f(0.0, 0.0, SHADOW_LIFT)));
+    let light = lit(albedo.rgb, relative, normal, ShadowPoint(point.surface, hit + vec3f(0.0, 0.0, SHADOW_LIFT), hit_position));
 
     let depth = dot(relative, frame.forward.xyz);
     var out: ReliefTargets;
@@ -46,7 +36,6 @@ fn shade_relief(position: vec3f, point: SurfacePoint) -> ReliefTargets {
     out.normal = vec4f(normal, ray.cos_theta);
     out.ray_start = vec4f(ray.start, ray.tile.x);
     out.ray_delta = vec4f(ray.delta, ray.tile.y);
-    // Reversed: 1 at the near plane, 0 at infinity, the same relative precision everywhere.
-    out.depth = clamp(frame.forward.w / max(depth, frame.forward.w), 0.0, 1.0);
+    out.depth = target_depth(depth);
     return out;
 }

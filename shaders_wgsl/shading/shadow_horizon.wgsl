@@ -13,6 +13,7 @@ const SHADOW_RAYS: u32 = 0u;
 struct ShadowPoint {
     surface: SurfaceFrame,
     place: vec3f,          // texture space
+    position: vec3f,       // object space
 }
 
 fn tests_shadows() -> bool {
@@ -26,7 +27,7 @@ fn shadow_point_on_mesh(point: SurfacePoint) -> ShadowPoint {
         surface.dpdu = point.tangent.xyz * horizon_info.tile_size.x;
         surface.dpdv = cross(point.tangent.xyz, surface.normal) * (point.tangent.w * horizon_info.tile_size.y);
     }
-    return ShadowPoint(surface, vec3f(point.uv, 0.0));
+    return ShadowPoint(surface, vec3f(point.uv, 0.0), vec3f(0.0));
 }
 
 // Sine of the horizon's elevation at `uv` towards a direction of the map's mesh space, y up.

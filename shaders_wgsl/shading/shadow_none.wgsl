@@ -7,6 +7,7 @@ const SHADOW_RAYS: u32 = 0u;
 struct ShadowPoint {
     surface: SurfaceFrame,
     place: vec3f,
+    position: vec3f,       // object space
 }
 
 fn tests_shadows() -> bool {
@@ -14,7 +15,7 @@ fn tests_shadows() -> bool {
 }
 
 fn shadow_point_on_mesh(point: SurfacePoint) -> ShadowPoint {
-    return ShadowPoint(point.surface, vec3f(point.uv, 0.0));
+    return ShadowPoint(point.surface, vec3f(point.uv, 0.0), vec3f(0.0));
 }
 
 fn hidden(point: ShadowPoint, to_light: vec3f, distant: bool) -> f32 {

@@ -10,6 +10,7 @@ override cast_shadows: bool = true;
 struct ShadowPoint {
     surface: SurfaceFrame,
     place: vec3f,          // the hit in texture space, u and v within the first period
+    position: vec3f,       // object space
 }
 
 fn tests_shadows() -> bool {

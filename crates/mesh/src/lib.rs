@@ -28,7 +28,7 @@ mod obj;
 pub use detail::{
     DetailMaps, DetailOptions, DetailReport, NormalSpace, SkyOptions, bake_detail, tangent_map,
 };
-pub use displace::{Cut, Displaced, EdgeSide, Relief, displace};
+pub use displace::{Cut, Displaced, EdgeSide, Relief, bridges, displace};
 pub use error::MeshError;
 pub use frame::{Derivatives, FrameMethod, Split, derivatives, normal_derivatives, tangents};
 pub use material::{ImageSource, MaterialSource};

@@ -66,7 +66,7 @@ pub fn techniques(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
         list.append(entry)
     };
     for plain in &render::PLAIN_TECHNIQUES {
-        add(plain.name, plain.summary, plain.source, false, false, Vec::new())?;
+        add(plain.name, plain.summary, plain.source, plain.displaces, false, Vec::new())?;
     }
     for info in Technique::all() {
         let parameters = info

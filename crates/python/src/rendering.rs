@@ -96,6 +96,7 @@ pub fn render_scene<'py>(
     size: [u32; 2],
     shadows: Option<bool>,
     horizon: Option<(u32, f32)>,
+    silhouettes: bool,
     aovs: Vec<String>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let technique = parse_choice(technique, &parameters)?;
@@ -139,7 +140,8 @@ pub fn render_scene<'py>(
             background,
         };
         let horizon = horizon.map(|(azimuths, softness)| HorizonShadows { azimuths, softness });
-        let request = Request { shadows, horizon, aovs, ..Request::new(technique, size[0], size[1]) };
+        let request =
+            Request { shadows, horizon, silhouettes, aovs, ..Request::new(technique, size[0], size[1]) };
         render::render(&device, &scene, &request)
     })?;
     frame_to_dict(py, frame)

@@ -92,6 +92,17 @@ impl Camera {
         band * projection * view
     }
 
+    /// Directions of a band of rows as the picture has them, world axes, 1 along the view axis: through its
+    /// upper left corner, and how that changes from one pixel to the next and from one row to the next.
+    pub fn pixel_directions(&self, size: [u32; 2], first_row: u32) -> [DVec3; 3] {
+        let (right, up, forward) = self.axes();
+        let [width, height] = size.map(f64::from);
+        let pixel = 2.0 * (0.5 * self.fov_y).tan() / height;
+        let corner =
+            forward - right * (0.5 * width * pixel) + up * ((0.5 * height - f64::from(first_row)) * pixel);
+        [corner, right * pixel, -up * pixel]
+    }
+
     /// Whether a ball in camera-relative world space lies wholly outside a picture of that aspect.
     pub fn misses_ball(&self, aspect: f64, centre: DVec3, radius: f64) -> bool {
         let (right, up, forward) = self.axes();

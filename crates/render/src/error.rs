@@ -98,6 +98,9 @@ pub enum RenderError {
         /// All names.
         known: String,
     },
+    /// A mesh cannot be displaced.
+    #[error("displacement: {0}")]
+    Displacement(#[source] mesh::MeshError),
     /// A map cannot be baked.
     #[error(transparent)]
     Bake(#[from] bake::BakeError),

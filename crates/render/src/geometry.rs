@@ -1,7 +1,7 @@
 //! Meshes on the device.
 
 use glam::{DMat4, DVec3, Vec3};
-use mesh::Mesh;
+use mesh::{Displaced, Mesh};
 use rayon::prelude::*;
 
 use crate::pipeline::ATTRIBUTES;
@@ -12,6 +12,22 @@ pub(crate) struct Geometry {
     pub attributes: [Option<wgpu::Buffer>; ATTRIBUTES.len()],
     pub indices: wgpu::Buffer,
 }
+
+/// Triangles of a box whose corners are numbered by a bit for each axis.
+pub(crate) const CUBOID: [[u32; 3]; 12] = [
+    [0, 4, 6],
+    [0, 6, 2],
+    [1, 3, 7],
+    [1, 7, 5],
+    [0, 1, 5],
+    [0, 5, 4],
+    [2, 6, 7],
+    [2, 7, 3],
+    [0, 2, 3],
+    [0, 3, 1],
+    [4, 5, 7],
+    [4, 7, 6],
+];
 
 /// The middle of a mesh. Positions are uploaded relative to it.
 pub(crate) fn centre(mesh: &Mesh) -> DVec3 {
@@ -74,6 +90,43 @@ impl Geometry {
             let label = ATTRIBUTES[location].0;
             geometry.attributes[location] =
                 Some(device.buffer_with(label, bytes, wgpu::BufferUsages::VERTEX)?);
+        }
+        Ok(geometry)
+    }
+
+    /// Uploads a box, wound to be seen from outside.
+    pub fn cuboid(device: &Device, low: Vec3, high: Vec3) -> Result<Self, RenderError> {
+        let corner =
+            |bits: u32| Vec3::from([0, 1, 2].map(|axis| [low, high][(bits >> axis & 1) as usize][axis]));
+        let corners: [Vec3; 8] = [0, 1, 2, 3, 4, 5, 6, 7].map(corner);
+        let bytes = bytemuck::cast_slice(&corners);
+        let mut geometry = Self {
+            attributes: Default::default(),
+            indices: device.buffer_with("box", bytemuck::cast_slice(&CUBOID), wgpu::BufferUsages::INDEX)?,
+        };
+        geometry.attributes[0] =
+            Some(device.buffer_with("box corners", bytes, wgpu::BufferUsages::VERTEX)?);
+        Ok(geometry)
+    }
+
+    /// Uploads micro-polygons.
+    pub fn micro(device: &Device, displaced: &Displaced) -> Result<Self, RenderError> {
+        let vertex = wgpu::BufferUsages::VERTEX;
+        let mut geometry = Self {
+            attributes: Default::default(),
+            indices: device.buffer_with(
+                "micro-triangles",
+                bytemuck::cast_slice(&displaced.indices),
+                wgpu::BufferUsages::INDEX,
+            )?,
+        };
+        for (location, bytes) in [
+            (0, bytemuck::cast_slice(&displaced.positions)),
+            (8, bytemuck::cast_slice(&displaced.faces)),
+            (9, bytemuck::cast_slice(&displaced.weights)),
+        ] {
+            geometry.attributes[location] =
+                Some(device.buffer_with(ATTRIBUTES[location].0, bytes, vertex)?);
         }
         Ok(geometry)
     }

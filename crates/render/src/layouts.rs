@@ -26,8 +26,8 @@ pub struct Layouts {
     pub pyramid: BindGroupLayout,
     /// Group 1: corners, and a buffer that goes with their cells: cone ratios or distances.
     pub cells: BindGroupLayout,
-    /// Group 3.
-    pub draw: BindGroupLayout,
+    draw: BindGroupLayout,
+    draw_with_shell: BindGroupLayout,
     /// Group 0 of the march kernel.
     pub march: BindGroupLayout,
     material: [BindGroupLayout; 3],
@@ -43,6 +43,13 @@ impl Layouts {
         let seen = ShaderStages::FRAGMENT | ShaderStages::COMPUTE;
         let heights_filter =
             if filterable { SamplerBindingType::Filtering } else { SamplerBindingType::NonFiltering };
+        let draw = [
+            entry(0, ShaderStages::VERTEX_FRAGMENT, storage(true)),
+            entry(1, ShaderStages::FRAGMENT, storage(true)),
+            entry(2, ShaderStages::FRAGMENT, storage(true)),
+            entry(3, ShaderStages::FRAGMENT, storage(true)),
+            entry(4, ShaderStages::FRAGMENT, storage(true)),
+        ];
         let material = [
             entry(0, ShaderStages::FRAGMENT, uniform()),
             entry(1, ShaderStages::FRAGMENT, texture(true, TextureViewDimension::D2)),
@@ -86,7 +93,8 @@ impl Layouts {
                 "cells",
                 &[entry(0, seen, storage(true)), entry(1, seen, storage(true)), entry(2, seen, uniform())],
             ),
-            draw: make("draw", &[entry(0, ShaderStages::VERTEX_FRAGMENT, uniform())]),
+            draw: make("draw", &draw[..1]),
+            draw_with_shell: make("draw with its shell", &draw),
             march: make(
                 "march",
                 &[
@@ -104,6 +112,11 @@ impl Layouts {
         }
     }
 
+    /// The layout of group 3; `shell`: with the mesh and the shell around it.
+    pub fn draw(&self, shell: bool) -> &BindGroupLayout {
+        if shell { &self.draw_with_shell } else { &self.draw }
+    }
+
     /// The layout of group 2; `horizon`: with a horizon map at bindings 7 to 9.
     pub fn material(&self, maps: MaterialMaps, horizon: bool) -> &BindGroupLayout {
         let layouts = if horizon { &self.material_with_horizon } else { &self.material };
@@ -113,6 +126,11 @@ impl Layouts {
             MaterialMaps::MapAndCube => 2,
         }]
     }
+}
+
+/// Whether an entry finds out for itself which triangle it sees, and traces rays through the shell.
+pub fn reads_shell(entry: &str) -> bool {
+    matches!(entry, "displaced" | "shell")
 }
 
 fn entry(binding: u32, visibility: ShaderStages, ty: BindingType) -> BindGroupLayoutEntry {

@@ -6,6 +6,7 @@ use heightfield::technique::Reads;
 use heightfield::{HeightField, Technique};
 
 use crate::device::lock;
+use crate::layouts::reads_shell;
 use crate::request::Program;
 use crate::targets::{DEPTH_FORMAT, TARGET_FORMATS, TargetSet};
 use crate::{Device, RenderError, TechniqueChoice};
@@ -28,7 +29,7 @@ pub(crate) enum Pipeline {
 }
 
 /// Vertex attributes in the order of their shader locations.
-pub(crate) const ATTRIBUTES: [(&str, wgpu::VertexFormat); 8] = [
+pub(crate) const ATTRIBUTES: [(&str, wgpu::VertexFormat); 10] = [
     ("position", wgpu::VertexFormat::Float32x3),
     ("normal", wgpu::VertexFormat::Float32x3),
     ("uv", wgpu::VertexFormat::Float32x2),
@@ -37,6 +38,8 @@ pub(crate) const ATTRIBUTES: [(&str, wgpu::VertexFormat); 8] = [
     ("tangent", wgpu::VertexFormat::Float32x4),
     ("dndu", wgpu::VertexFormat::Float32x3),
     ("dndv", wgpu::VertexFormat::Float32x3),
+    ("face", wgpu::VertexFormat::Uint32),
+    ("weights", wgpu::VertexFormat::Float32x2),
 ];
 
 /// The locations that an entry reads.
@@ -46,6 +49,8 @@ pub(crate) fn attributes(entry: &str) -> &'static [usize] {
         "bent" | "relief" => &[0, 1, 2, 3, 4, 6, 7],
         "mapped" | "dot3" => &[0, 1, 2, 5],
         "relief_mapped" => &[0, 1, 2, 3, 4, 5],
+        "displaced" => &[0, 8, 9],
+        "shell" => &[0],
         _ => &[0, 1, 2],
     }
 }
@@ -62,9 +67,14 @@ pub(crate) fn reads_of(technique: &TechniqueChoice) -> Option<Reads> {
 pub(crate) fn constants_of(technique: &Technique, field: &HeightField) -> Vec<(&'static str, i64)> {
     let mut constants: Vec<_> = technique.settings().map(|(name, value)| (name, value as i64)).collect();
     if technique.info.reads == Reads::Pyramid {
-        constants.push(("endless", i64::from(!field.is_periodic())));
+        constants.push(endless(field));
     }
     constants
+}
+
+/// The constant of programs that read the skip pyramid.
+pub(crate) fn endless(field: &HeightField) -> (&'static str, i64) {
+    ("endless", i64::from(!field.is_periodic()))
 }
 
 impl Device {
@@ -152,7 +162,7 @@ impl Device {
                 Some(&self.layouts.frame),
                 self.field_layout(key.reads),
                 Some(self.layouts.material(key.program.maps, key.program.horizon)),
-                Some(&self.layouts.draw),
+                Some(self.layouts.draw(reads_shell(key.program.entry))),
             ],
             immediate_size: 0,
         });
@@ -200,7 +210,11 @@ impl Device {
             primitive: wgpu::PrimitiveState {
                 // A mirroring transform turns the winding around.
                 front_face: if key.mirrored { wgpu::FrontFace::Cw } else { wgpu::FrontFace::Ccw },
-                cull_mode: (!key.double_sided).then_some(wgpu::Face::Back),
+                cull_mode: match key.program.entry {
+                    // The far sides of the box.
+                    "shell" => Some(wgpu::Face::Front),
+                    _ => (!key.double_sided).then_some(wgpu::Face::Back),
+                },
                 ..Default::default()
             },
             depth_stencil: Some(wgpu::DepthStencilState {

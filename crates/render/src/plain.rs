@@ -1,4 +1,4 @@
-//! The techniques whose surface stays on the mesh. A new one is a file in `surface/`, its twin in
+//! The techniques that do not search: the surface stays on the mesh, or the mesh itself is displaced. A new one is a file in `surface/`, its twin in
 //! `shaders_wgsl/surface/`, and an entry here.
 
 use heightfield::technique::Reads;
@@ -24,6 +24,8 @@ pub struct PlainTechnique {
     pub(crate) reads: Option<Reads>,
     /// Entry and surface that take their place when the material has a normal map of its own.
     pub(crate) own_normals: Option<(&'static str, &'static str)>,
+    /// Whether the mesh is cut into micro-polygons that are moved.
+    pub displaces: bool,
 }
 
 /// Reads heights at the point, in the axes of the mapping.
@@ -37,10 +39,11 @@ const BUMP: PlainTechnique = PlainTechnique {
     maps: MaterialMaps::None,
     reads: Some(Reads::Heights),
     own_normals: None,
+    displaces: false,
 };
 
 /// All of them, the plainest first.
-pub const PLAIN_TECHNIQUES: [PlainTechnique; 9] = [
+pub const PLAIN_TECHNIQUES: [PlainTechnique; 10] = [
     PlainTechnique {
         name: "flat",
         summary: "the bare mesh, no relief",
@@ -106,5 +109,17 @@ pub const PLAIN_TECHNIQUES: [PlainTechnique; 9] = [
         maps: MaterialMaps::MapAndCube,
         reads: None,
         ..BUMP
+    },
+    PlainTechnique {
+        name: "displacement",
+        summary: "micro-polygons below a pixel, moved along the normals: real geometry, watertight",
+        source: "Cook, Shade Trees, SIGGRAPH 1984; Cook, Carpenter, Catmull, The Reyes Image Rendering \
+                 Architecture, SIGGRAPH 1987",
+        entry: "displaced",
+        surface: "displaced",
+        maps: MaterialMaps::Map,
+        reads: Some(Reads::Pyramid),
+        own_normals: Some(("displaced", "tangent")),
+        displaces: true,
     },
 ];

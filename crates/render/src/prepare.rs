@@ -7,13 +7,16 @@ use std::time::Instant;
 use glam::{DMat4, Vec4};
 use mesh::Mesh;
 
-use crate::geometry::{Geometry, ball, centre};
+use crate::geometry::{CUBOID, Geometry, ball, centre};
 use crate::heights::bind;
 use crate::layouts::MaterialMaps;
-use crate::pipeline::{Pipeline, PipelineKey, attributes, constants_of, reads_of};
+use crate::micro::{self, View};
+use crate::pipeline::{Pipeline, PipelineKey, attributes, constants_of, endless, reads_of};
 use crate::request::Program;
+use crate::shell::Shell;
 use crate::targets::TargetSet;
 use crate::texture;
+use crate::triangles::Triangles;
 use crate::uniforms::{DrawInfo, HorizonInfo, LightInfo, MaterialInfo, wrap_code};
 use crate::uploads::{Kind, Resource};
 use crate::{
@@ -31,6 +34,16 @@ pub(crate) struct Prepared {
     pub draw: wgpu::BindGroup,
 }
 
+/// One pipeline's share of a draw: its program and what it draws.
+struct Part {
+    program: Program,
+    geometry: Arc<Geometry>,
+    triangles: std::ops::Range<u32>,
+}
+
+/// Meshes that have been uploaded, by the attributes they have there.
+type Meshes = HashMap<(*const Mesh, &'static [usize]), Arc<Geometry>>;
+
 /// Prepares all draws that may be in the picture.
 pub(crate) fn draws(
     device: &Device,
@@ -38,11 +51,13 @@ pub(crate) fn draws(
     request: &Request,
     shadows: bool,
     stats: &mut Stats,
+    warnings: &mut Vec<String>,
 ) -> Result<Vec<Prepared>, RenderError> {
+    let size = [request.width, request.height];
     let aspect = f64::from(request.width) / f64::from(request.height);
-    let mut meshes: HashMap<(*const Mesh, &'static [usize]), Arc<Geometry>> = HashMap::new();
+    let mut meshes = Meshes::new();
     let mut prepared = Vec::new();
-    for draw in &scene.draws {
+    for (index, draw) in scene.draws.iter().enumerate() {
         let middle = centre(draw.mesh);
         let relative_from_object = DMat4::from_translation(-scene.camera.eye)
             * draw.world_from_object.as_dmat4()
@@ -53,47 +68,100 @@ pub(crate) fn draws(
             stats.triangles_culled += count;
             continue;
         }
-        stats.triangles_drawn += count;
-
-        let mut program = request.technique.program(draw.material.normal.is_some());
-        let horizon =
-            request.horizon.filter(|_| request.shadows != Some(false) && request.technique.takes_horizon());
-        program.horizon = horizon.is_some();
-        let locations = attributes(program.entry);
-        let geometry = match meshes.get(&(std::ptr::from_ref(draw.mesh), locations)) {
-            Some(geometry) => Arc::clone(geometry),
-            None => {
-                let geometry = Arc::new(Geometry::new(device, draw.mesh, middle, locations)?);
-                meshes.insert((std::ptr::from_ref(draw.mesh), locations), Arc::clone(&geometry));
-                geometry
-            }
+        let view = View { camera: &scene.camera, relative_from_object, centre: middle, size };
+        // A shell of no height holds nothing; on the mesh itself the search sees the same.
+        let in_shell = request.in_shell() && draw.material.field.extent().scale > 0.0;
+        let shell = if in_shell || request.technique.draws_geometry() {
+            Some(Shell::new(device, draw, middle)?)
+        } else {
+            None
         };
+        let seen_in = shell.as_ref().filter(|_| in_shell);
+        let parts = parts(device, draw, request, &view, seen_in, &mut meshes, |coarser| {
+            warnings.push(format!(
+                "draw {index}: micro-polygons are up to {coarser:.1} pixels wide, to keep their number down"
+            ));
+        })?;
         let reads = reads_of(&request.technique);
         let field = reads.map(|reads| device.field_group(&draw.material.field, reads)).transpose()?;
-        let material = material_group(device, draw.material, program, horizon, stats)?;
-        let before = Instant::now();
-        let pipeline = device.pipeline(key(draw, request, program, shadows))?;
-        stats.compile_ms += before.elapsed().as_secs_f64() * 1e3;
-        prepared.push(Prepared {
-            pipeline,
-            geometry,
-            locations,
-            triangles: draw.triangles.clone(),
-            field,
-            material,
-            draw: draw_group(device, relative_from_object)?,
-        });
+        // Light rays through a relief of no height meet nothing.
+        let shadows = shadows && !(shell.is_some() && draw.material.field.extent().scale == 0.0);
+        let draw_group = draw_group(device, draw, &view, shell.as_ref())?;
+        for Part { program, geometry, triangles } in parts {
+            stats.triangles_drawn += u64::from(triangles.end - triangles.start);
+            let material = material_group(device, draw.material, program, request.horizon, stats)?;
+            let before = Instant::now();
+            let pipeline = device.pipeline(key(draw, request, program, shadows))?;
+            stats.compile_ms += before.elapsed().as_secs_f64() * 1e3;
+            let (field, draw) = (field.clone(), draw_group.clone());
+            let locations = attributes(program.entry);
+            prepared.push(Prepared { pipeline, geometry, locations, triangles, field, material, draw });
+        }
     }
     Ok(prepared)
+}
+
+/// What is drawn of a draw, and by which programs. `shell`: where rays are traced through it.
+fn parts(
+    device: &Device,
+    draw: &Draw<'_>,
+    request: &Request,
+    view: &View<'_>,
+    shell: Option<&Shell>,
+    meshes: &mut Meshes,
+    mut coarsened: impl FnMut(f64),
+) -> Result<Vec<Part>, RenderError> {
+    let own_normals = draw.material.normal.is_some();
+    let mut program = request.technique.program(own_normals);
+    let mut micro = |program: Program, only_bridges: bool| -> Result<Part, RenderError> {
+        let (displaced, coarser) = micro::displaced(draw, view, only_bridges)?;
+        if coarser > 1.0 {
+            coarsened(coarser);
+        }
+        let geometry = Arc::new(Geometry::micro(device, &displaced)?);
+        Ok(Part { program, geometry, triangles: 0..displaced.indices.len() as u32 })
+    };
+    if let Some(shell) = shell {
+        let [low, high] = shell.bounds;
+        let shell = Part {
+            program: Program { entry: "shell", ..program },
+            geometry: Arc::new(Geometry::cuboid(device, low, high)?),
+            triangles: 0..CUBOID.len() as u32,
+        };
+        let bridges = micro(Program { entry: "displaced", ..program }, true)?;
+        return Ok([shell, bridges].into_iter().filter(|part| !part.triangles.is_empty()).collect());
+    }
+    if request.technique.draws_geometry() {
+        return Ok(vec![micro(program, false)?]);
+    }
+    program.horizon =
+        request.horizon.is_some() && request.shadows != Some(false) && request.technique.takes_horizon();
+    let locations = attributes(program.entry);
+    let known = (std::ptr::from_ref(draw.mesh), locations);
+    let geometry = match meshes.get(&known) {
+        Some(geometry) => Arc::clone(geometry),
+        None => {
+            let geometry = Arc::new(Geometry::new(device, draw.mesh, view.centre, locations)?);
+            meshes.insert(known, Arc::clone(&geometry));
+            geometry
+        }
+    };
+    Ok(vec![Part { program, geometry, triangles: draw.triangles.clone() }])
 }
 
 fn key(draw: &Draw<'_>, request: &Request, program: Program, shadows: bool) -> PipelineKey {
     let mut constants = Vec::new();
     if let TechniqueChoice::Search(technique) = &request.technique {
         constants = constants_of(technique, &draw.material.field);
-        if !program.horizon {
-            constants.push(("cast_shadows", i64::from(shadows)));
-        }
+    }
+    if request.technique.draws_geometry() {
+        constants.push(endless(&draw.material.field));
+    }
+    if program.search.is_some() && !program.horizon {
+        constants.push(("cast_shadows", i64::from(shadows)));
+    }
+    if program.entry == "shell" {
+        constants.push(("sees_inside", i64::from(draw.material.double_sided)));
     }
     PipelineKey {
         program,
@@ -105,19 +173,33 @@ fn key(draw: &Draw<'_>, request: &Request, program: Program, shadows: bool) -> P
     }
 }
 
-fn draw_group(device: &Device, relative_from_object: DMat4) -> Result<wgpu::BindGroup, RenderError> {
-    let object_from_relative = relative_from_object.inverse();
+/// Group 3, with the mesh and its shell where there is one.
+fn draw_group(
+    device: &Device,
+    draw: &Draw<'_>,
+    view: &View<'_>,
+    shell: Option<&Shell>,
+) -> Result<wgpu::BindGroup, RenderError> {
+    let object_from_relative = view.relative_from_object.inverse();
     let info = DrawInfo {
-        relative_from_object: relative_from_object.as_mat4(),
+        relative_from_object: view.relative_from_object.as_mat4(),
         object_from_relative: object_from_relative.as_mat4(),
         eye: object_from_relative.w_axis.as_vec4(),
     };
-    let buffer = device.buffer_with("draw", bytemuck::bytes_of(&info), wgpu::BufferUsages::UNIFORM)?;
+    let buffer = device.buffer_with("draw", bytemuck::bytes_of(&info), wgpu::BufferUsages::STORAGE)?;
+    let mut entries = vec![bind(0, buffer.as_entire_binding())];
+    let triangles = shell.map(|_| Triangles::new(device, draw.mesh, view.centre)).transpose()?;
+    if let (Some(triangles), Some(shell)) = (&triangles, shell) {
+        entries.push(bind(1, triangles.vertices.as_entire_binding()));
+        entries.push(bind(2, triangles.indices.as_entire_binding()));
+        entries.push(bind(3, shell.nodes.as_entire_binding()));
+        entries.push(bind(4, shell.prisms.as_entire_binding()));
+    }
     device.guard("binding a draw", || {
         Ok(device.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("draw"),
-            layout: &device.layouts.draw,
-            entries: &[bind(0, buffer.as_entire_binding())],
+            layout: device.layouts.draw(shell.is_some()),
+            entries: &entries,
         }))
     })
 }
@@ -210,6 +292,7 @@ fn material_group(
         entries.push(bind(5, wgpu::BindingResource::TextureView(cube)));
         entries.push(bind(6, wgpu::BindingResource::Sampler(&cube_sampler)));
     }
+    let horizon = horizon.filter(|_| program.horizon);
     let horizon = horizon.map(|horizon| HorizonBinding::new(device, material, horizon, stats)).transpose()?;
     if let Some(horizon) = &horizon {
         entries.push(bind(7, wgpu::BindingResource::TextureView(&horizon.map)));

@@ -45,11 +45,11 @@ pub fn render_in_bands(
     Device::check("picture width, in pixels,", u64::from(width), longest)?;
     Device::check("picture height, in pixels,", u64::from(height), longest)?;
     scene.validate()?;
-    let warnings = warnings(scene, request);
+    let mut warnings = warnings(scene, request);
     let shadows = request.shadows.unwrap_or(true) && request.technique.casts_shadows();
     let mut stats = Stats::default();
 
-    let draws = prepare::draws(device, scene, request, shadows, &mut stats)?;
+    let draws = prepare::draws(device, scene, request, shadows, &mut stats, &mut warnings)?;
     let rows_at_once = (band_pixels / u64::from(width)).clamp(1, u64::from(height)) as u32;
     let targets = Targets::new(device, TargetSet::of(request.aovs), width, rows_at_once)?;
     let timer = Timer::new(device)?;
@@ -99,11 +99,18 @@ pub fn render_in_bands(
 fn warnings(scene: &Scene<'_>, request: &Request) -> Vec<String> {
     let mut warnings = Vec::new();
     let name = request.technique.name();
-    if request.horizon.is_some() && !request.technique.takes_horizon() {
+    if request.horizon.is_some() && request.in_shell() {
+        warnings.push("silhouettes=True casts its own shadows; horizon shadows have no effect".to_owned());
+    } else if request.horizon.is_some() && !request.technique.takes_horizon() {
         warnings.push(format!("technique {name:?} takes no horizon map; horizon shadows have no effect"));
     } else if request.shadows == Some(true) && request.horizon.is_none() && !request.technique.casts_shadows()
     {
         warnings.push(format!("technique {name:?} casts no shadows; shadows=True has no effect"));
+    }
+    if request.silhouettes && !request.technique.has_silhouettes() && !request.technique.draws_geometry() {
+        warnings.push(format!(
+            "technique {name:?} has no true outlines, only \"exact\" has; silhouettes=True has no effect"
+        ));
     }
     if request.technique.name() == "dot3" {
         if scene.lights.len() > 1 {
@@ -178,10 +185,14 @@ impl FrameBinding {
     fn write(&self, device: &Device, scene: &Scene<'_>, request: &Request, first_row: u32, rows: u32) {
         let camera = &scene.camera;
         let [r, g, b] = scene.ambient;
+        let size = [request.width, request.height];
+        let directions = camera.pixel_directions(size, first_row);
+        let [corner, pixel_right, pixel_down] = directions.map(|direction| direction.extend(0.0).as_vec4());
         let info = FrameInfo {
-            clip_from_relative: camera
-                .clip_from_relative([request.width, request.height], first_row, rows)
-                .as_mat4(),
+            clip_from_relative: camera.clip_from_relative(size, first_row, rows).as_mat4(),
+            corner,
+            pixel_right,
+            pixel_down,
             forward: camera.forward().extend(camera.near()).as_vec4(),
             ambient: Vec4::new(r, g, b, 0.0),
             light_count: scene.lights.len() as u32,

@@ -45,18 +45,34 @@ impl TechniqueChoice {
 
     /// Whether it moves what is seen, and so depth.
     pub fn displaces(&self) -> bool {
-        matches!(self, Self::Search(_))
+        match self {
+            Self::Plain(plain) => plain.displaces,
+            Self::Search(_) => true,
+        }
     }
 
     /// Whether it can show self-shadows.
     pub fn casts_shadows(&self) -> bool {
-        matches!(self, Self::Search(technique) if technique.info.casts_shadows)
+        match self {
+            Self::Plain(plain) => plain.displaces,
+            Self::Search(technique) => technique.info.casts_shadows,
+        }
+    }
+
+    /// Whether the mesh itself is displaced.
+    pub fn draws_geometry(&self) -> bool {
+        matches!(self, Self::Plain(plain) if plain.displaces)
+    }
+
+    /// Whether it can be traced through the shell around the mesh, with true outlines.
+    pub fn has_silhouettes(&self) -> bool {
+        matches!(self, Self::Search(technique) if technique.info.name == "exact")
     }
 
     /// Whether a horizon map can shadow it: it has a relief, the axes of the texture mapping, and more than
     /// one fixed-function light.
     pub fn takes_horizon(&self) -> bool {
-        !matches!(self, Self::Plain(plain) if ["plain", "dot3"].contains(&plain.entry))
+        !matches!(self, Self::Plain(plain) if ["plain", "dot3", "displaced"].contains(&plain.entry))
     }
 
     /// The shader files it is made of. `own_normals`: the material has a normal map.
@@ -65,7 +81,9 @@ impl TechniqueChoice {
             Self::Plain(plain) => {
                 let own = plain.own_normals.filter(|_| own_normals);
                 let (entry, surface) = own.unwrap_or((plain.entry, plain.surface));
-                Program { entry, search: None, surface, maps: plain.maps, horizon: false }
+                // Its shadow rays go through the shell.
+                let search = plain.displaces.then_some("exact");
+                Program { entry, search, surface, maps: plain.maps, horizon: false }
             }
             Self::Search(technique) => {
                 let (entry, surface) =
@@ -190,13 +208,29 @@ pub struct Request {
     pub shadows: Option<bool>,
     /// Self-shadows from a horizon map in place of rays, also for techniques that cast none.
     pub horizon: Option<HorizonShadows>,
+    /// Whether rays are traced through the shell around the mesh, so that outlines, depth and shadows are those
+    /// of the displaced mesh; on a technique that cannot it is a warning.
+    pub silhouettes: bool,
     /// Additional outputs.
     pub aovs: AovSet,
 }
 
 impl Request {
+    /// Whether rays are traced through the shell.
+    pub(crate) fn in_shell(&self) -> bool {
+        self.silhouettes && self.technique.has_silhouettes()
+    }
+
     /// A picture with no further outputs.
     pub fn new(technique: TechniqueChoice, width: u32, height: u32) -> Self {
-        Self { technique, width, height, shadows: None, horizon: None, aovs: AovSet::NONE }
+        Self {
+            technique,
+            width,
+            height,
+            shadows: None,
+            horizon: None,
+            silhouettes: false,
+            aovs: AovSet::NONE,
+        }
     }
 }

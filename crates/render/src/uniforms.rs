@@ -13,6 +13,12 @@ pub struct FrameInfo {
     pub forward: Vec4,
     /// Linear rgb.
     pub ambient: Vec4,
+    /// Direction through the upper left corner of the picture, world axes; 1 along the view axis.
+    pub corner: Vec4,
+    /// How it changes from one pixel to the next.
+    pub pixel_right: Vec4,
+    /// And from one row to the next.
+    pub pixel_down: Vec4,
     /// Lights in the buffer that count.
     pub light_count: u32,
     /// Padding.
@@ -43,6 +49,55 @@ pub struct DrawInfo {
     pub object_from_relative: Mat4,
     /// Camera in the space of the centred mesh.
     pub eye: Vec4,
+}
+
+/// Twin of `MeshVertex` in `shaders_wgsl/bindings/triangles.wgsl`.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub struct MeshVertex {
+    /// Position, object space; `w`: u.
+    pub place: Vec4,
+    /// Unit normal; `w`: v.
+    pub up: Vec4,
+    /// `dP/du`; `w`: x of the tangent.
+    pub dpdu: Vec4,
+    /// `dP/dv`; `w`: y of the tangent.
+    pub dpdv: Vec4,
+    /// `dN/du`; `w`: z of the tangent.
+    pub dndu: Vec4,
+    /// `dN/dv`; `w`: w of the tangent.
+    pub dndv: Vec4,
+}
+
+/// What stands for the number of prisms of a node with children.
+pub const INNER_NODE: u32 = u32::MAX;
+
+/// Twin of `ShellNode` in `shaders_wgsl/bindings/shell.wgsl`.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub struct ShellNode {
+    /// Lower corner of the box, object space.
+    pub low: [f32; 3],
+    /// First of two children, or first prism.
+    pub first: u32,
+    /// Upper corner.
+    pub high: [f32; 3],
+    /// Prisms, or [`INNER_NODE`] where there are children.
+    pub count: u32,
+}
+
+/// Twin of `ShellPrism` in `shaders_wgsl/bindings/shell.wgsl`.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub struct ShellPrism {
+    /// The triangle it stands on.
+    pub face: u32,
+    /// Where it begins along the interpolated normals, mesh units.
+    pub low: f32,
+    /// Where it ends.
+    pub high: f32,
+    /// Padding.
+    pub unused: u32,
 }
 
 /// Twin of `MaterialInfo` in `shaders_wgsl/bindings/material.wgsl`.

@@ -6,7 +6,7 @@ use std::mem::offset_of;
 
 use render::uniforms::{
     DistanceInfo, DrawInfo, FrameInfo, HeightInfo, HorizonInfo, LightInfo, MarchResult, MarchSegment,
-    MaterialInfo,
+    MaterialInfo, MeshVertex, ShellNode, ShellPrism,
 };
 use shaders::{Field, Layout};
 
@@ -37,11 +37,15 @@ fn check(host: Layout, source: &str, name: &str) {
 fn host_structs_match() {
     let relief = shaders::compose("relief", Some("relief"), Some("displaced")).unwrap();
     check(
-        layout!(FrameInfo: clip_from_relative, forward, ambient, light_count, pad_0, pad_1, pad_2),
+        layout!(FrameInfo: clip_from_relative, forward, ambient, corner, pixel_right, pixel_down, light_count, pad_0, pad_1, pad_2),
         &relief,
         "FrameInfo",
     );
     check(layout!(LightInfo: place, color), &relief, "Light");
+    let displaced = shaders::compose("shell", Some("exact"), Some("displaced")).unwrap();
+    check(layout!(MeshVertex: place, up, dpdu, dpdv, dndu, dndv), &displaced, "MeshVertex");
+    check(layout!(ShellNode: low, first, high, count), &displaced, "ShellNode");
+    check(layout!(ShellPrism: face, low, high, unused), &displaced, "ShellPrism");
     check(layout!(DrawInfo: relative_from_object, object_from_relative, eye), &relief, "DrawInfo");
     check(
         layout!(MaterialInfo: albedo_factor, map_width, map_height, scale, base, specular, shininess, period, wrap),

@@ -39,6 +39,12 @@ fn programs() -> Vec<(String, String)> {
             }
         }
     }
+    for entry in ["displaced", "shell"] {
+        for surface in ["displaced", "tangent"] {
+            let program = shaders::compose(entry, Some("exact"), Some(surface)).unwrap();
+            programs.push((format!("{entry} + {surface}"), program));
+        }
+    }
     programs
 }
 

@@ -10,6 +10,7 @@
 //! Architecture", SIGGRAPH 1987 (micro-polygons below a pixel); Moule and McCool, "Efficient Bounded Adaptive
 //! Tessellation of Displacement Maps", Graphics Interface 2002 (numbers of pieces that belong to edges).
 
+mod bridges;
 mod pattern;
 mod seams;
 
@@ -18,6 +19,7 @@ use std::ops::Range;
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
+pub use self::bridges::bridges;
 use self::seams::Seams;
 use crate::{Mesh, MeshError};
 
@@ -73,6 +75,16 @@ pub struct Cut<'a> {
     pub limit: u64,
 }
 
+impl Cut<'_> {
+    fn check(&self, got: u64) -> Result<(), MeshError> {
+        let limit = self.limit.min(MAX_MICRO_TRIANGLES);
+        if got > limit {
+            return Err(MeshError::TooLarge { what: "micro-triangles".to_owned(), got, limit });
+        }
+        Ok(())
+    }
+}
+
 /// Displaces a mesh.
 ///
 /// # Errors
@@ -84,10 +96,7 @@ pub fn displace(mesh: &Mesh, cut: &Cut<'_>, relief: &Relief<'_>) -> Result<Displ
     let faces: Vec<u32> = range.clone().into_par_iter().filter(|&face| (cut.keep)(face)).collect();
     let of = |face: u32| seams.pieces_of((face - range.start) as usize, &pieces);
     let total: u64 = faces.iter().map(|&face| pattern::size(of(face)).0).sum();
-    let limit = cut.limit.min(MAX_MICRO_TRIANGLES);
-    if total > limit {
-        return Err(MeshError::TooLarge { what: "micro-triangles".to_owned(), got: total, limit });
-    }
+    cut.check(total)?;
     let rim = seams.displace(mesh, cut, &pieces, relief);
     let micro = |&face: &u32| {
         let pattern = pattern::pattern(of(face));

@@ -16,8 +16,21 @@ pub(super) struct Seams {
     welded: Vec<u32>,
     /// For each triangle of the range its edges, and whether it runs along them backwards.
     edges_of: Vec<[(u32, bool); 3]>,
-    /// For each edge the vertices at its ends, once for each different side.
-    sides: Vec<Vec<[u32; 2]>>,
+    /// For each edge its different sides.
+    sides: Vec<Vec<Side>>,
+}
+
+/// One of the different ways in which the triangles along an edge see it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Side {
+    /// The vertices at its ends, in the order of the edge.
+    pub ends: [u32; 2],
+    /// A triangle that sees it so.
+    pub face: u32,
+    /// The corner of the triangle at which the edge begins for it.
+    pub corner: usize,
+    /// Whether the triangle runs along it backwards.
+    pub backwards: bool,
 }
 
 /// Where the points of edges and corners are displaced to.
@@ -37,9 +50,10 @@ impl Seams {
             (mesh.positions[at] + Vec3::ZERO).to_array().map(f32::to_bits)
         });
         let mut numbers: HashMap<[u32; 2], u32> = HashMap::new();
-        let mut sides: Vec<Vec<[u32; 2]>> = Vec::new();
+        let mut sides: Vec<Vec<Side>> = Vec::new();
         let mut edges_of = Vec::with_capacity(range.len());
-        for triangle in &mesh.indices[range.start as usize..range.end as usize] {
+        for face in range.clone() {
+            let triangle = mesh.indices[face as usize];
             edges_of.push([0, 1, 2].map(|corner| {
                 let mut ends = [triangle[corner], triangle[(corner + 1) % 3]];
                 let backwards = welded[ends[0] as usize] > welded[ends[1] as usize];
@@ -52,8 +66,8 @@ impl Seams {
                     sides.len() as u32 - 1
                 });
                 let known = &mut sides[number as usize];
-                if !known.iter().any(|side| same_side(mesh, *side, ends)) {
-                    known.push(ends);
+                if !known.iter().any(|side| same_side(mesh, side.ends, ends)) {
+                    known.push(Side { ends, face, corner, backwards });
                 }
                 (number, backwards)
             }));
@@ -63,7 +77,7 @@ impl Seams {
 
     /// Pieces of each edge: as many as the most demanding of its sides asks for.
     pub fn pieces(&self, mesh: &Mesh, segments: &(dyn Fn(&EdgeSide) -> u32 + Sync)) -> Vec<u32> {
-        let of_side = |ends: &[u32; 2]| segments(&EdgeSide::of(mesh, *ends)).max(1);
+        let of_side = |side: &Side| segments(&EdgeSide::of(mesh, side.ends)).max(1);
         self.sides.iter().map(|sides| sides.iter().map(of_side).max().unwrap_or(1)).collect()
     }
 
@@ -96,18 +110,36 @@ impl Seams {
         let mut points = Vec::new();
         for (sides, &pieces) in self.sides.iter().zip(pieces) {
             first.push(points.len());
-            let [a, b] = sides[0].map(|end| mesh.positions[end as usize].as_dvec3());
+            let [a, b] = sides[0].ends.map(|end| mesh.positions[end as usize].as_dvec3());
             for k in 1..pieces {
                 let share = f64::from(k) / f64::from(pieces);
-                let seen = sides.iter().map(|&[a, b]| {
-                    let (a, b) = (a as usize, b as usize);
-                    let uv = mesh.uvs[a].as_dvec2().lerp(mesh.uvs[b].as_dvec2(), share);
-                    (uv, mesh.normals[a].as_dvec3().lerp(mesh.normals[b].as_dvec3(), share))
-                });
+                let seen = sides.iter().map(|side| side.at(mesh, share));
                 points.push((relief.shared(a.lerp(b, share), seen) - cut.origin).as_vec3());
             }
         }
         Rim { corners, points, first }
+    }
+
+    /// Micro-triangles of the strips along edges whose sides differ.
+    pub fn pieces_of_strips(&self, pieces: &[u32]) -> u64 {
+        let parted = self.sides.iter().zip(pieces).filter(|(sides, _)| sides.len() > 1);
+        parted.map(|(sides, &pieces)| 2 * sides.len() as u64 * u64::from(pieces)).sum()
+    }
+
+    /// The edges whose sides differ, with the number of their pieces, and where they are displaced to from
+    /// the first end to the last.
+    pub fn parted<'a>(
+        &'a self,
+        pieces: &'a [u32],
+        rim: &'a Rim,
+    ) -> impl Iterator<Item = (&'a [Side], Vec<Vec3>)> + 'a {
+        self.sides.iter().enumerate().filter(|(_, sides)| sides.len() > 1).map(|(edge, sides)| {
+            let [a, b] = sides[0].ends.map(|end| rim.corners[end as usize]);
+            let first = rim.first[edge];
+            let inside = &rim.points[first..first + pieces[edge] as usize - 1];
+            let line = std::iter::once(a).chain(inside.iter().copied()).chain(std::iter::once(b)).collect();
+            (sides.as_slice(), line)
+        })
     }
 
     /// Where the points on the rim of a triangle's pattern are: corners, then the points inside its edges.
@@ -137,6 +169,15 @@ fn same_side(mesh: &Mesh, a: [u32; 2], b: [u32; 2]) -> bool {
     same_vertex(mesh, a[0], b[0]) && same_vertex(mesh, a[1], b[1])
 }
 
+impl Side {
+    /// UV and normal, of any length, at a share of the edge.
+    pub fn at(&self, mesh: &Mesh, share: f64) -> (DVec2, DVec3) {
+        let [a, b] = self.ends.map(|end| end as usize);
+        let uv = mesh.uvs[a].as_dvec2().lerp(mesh.uvs[b].as_dvec2(), share);
+        (uv, mesh.normals[a].as_dvec3().lerp(mesh.normals[b].as_dvec3(), share))
+    }
+}
+
 impl EdgeSide {
     fn of(mesh: &Mesh, ends: [u32; 2]) -> Self {
         let ends = ends.map(|end| end as usize);
@@ -146,7 +187,7 @@ impl EdgeSide {
 
 impl Relief<'_> {
     /// The one place of a point that several sides share.
-    fn shared(&self, position: DVec3, sides: impl Iterator<Item = (DVec2, DVec3)>) -> DVec3 {
+    pub(super) fn shared(&self, position: DVec3, sides: impl Iterator<Item = (DVec2, DVec3)>) -> DVec3 {
         let (mut height, mut normal, mut count) = (0.0, DVec3::ZERO, 0.0);
         for (uv, side_normal) in sides {
             height += (self.height)(uv.x, uv.y);

@@ -1,6 +1,10 @@
 //! What the device tests share.
 #![allow(dead_code, missing_docs)]
 
+pub mod agree;
+pub mod shapes;
+pub mod truth;
+
 use std::sync::Arc;
 
 use glam::{DVec3, Vec2, Vec3};

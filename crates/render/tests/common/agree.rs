@@ -1,0 +1,115 @@
+//! How well a rendered relief agrees with the truth.
+#![allow(dead_code)]
+
+use glam::{DVec3, Vec2, Vec3};
+use render::{Camera, Frame};
+
+use super::truth::Hit;
+
+/// Differences between a picture and the truth.
+#[derive(Debug, Clone, Copy)]
+pub struct Agreement {
+    /// Pixels covered in both.
+    pub both: usize,
+    /// Pixels covered in one of them only, although all their neighbours in the truth are alike: more than a
+    /// pixel off, or a hole.
+    pub outline_off: usize,
+    /// Distance between the places, in pixels where they are, ninety-ninth percentile, away from edges in depth.
+    pub place_p99: f64,
+    /// Share of pixels more than a pixel off, of all that are covered in both, edges in depth included.
+    pub far: f64,
+    /// Distance between the texture coordinates in texels, ninety-ninth percentile, away from edges in depth.
+    pub texels_p99: f64,
+    /// Largest relative difference in depth between neighbours that are alike, ninety-ninth percentile.
+    pub depth_p99: f64,
+}
+
+fn percentile(mut values: Vec<f64>, share: f64) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values
+        .get(((values.len() as f64 * share) as usize).min(values.len().saturating_sub(1)))
+        .copied()
+        .unwrap_or(0.0)
+}
+
+/// Compares. The frame needs the outputs mask, position, depth and uv.
+pub fn agreement(frame: &Frame, truth: &[Option<Hit>], camera: &Camera, texels: [usize; 2]) -> Agreement {
+    let (w, h) = (frame.width as usize, frame.height as usize);
+    let mask = frame.aovs.mask.as_ref().unwrap();
+    let positions = frame.aovs.position.as_ref().unwrap();
+    let depths = frame.aovs.depth.as_ref().unwrap();
+    let uvs = frame.aovs.uv.as_ref().unwrap();
+    let pixel = 2.0 * (0.5 * camera.fov_y).tan() / h as f64;
+    let around = |at: usize| {
+        let (x, y) = ((at % w) as i64, (at / w) as i64);
+        (-1..=1).flat_map(move |dy| (-1..=1).map(move |dx| (x + dx, y + dy))).filter_map(move |(x, y)| {
+            ((0..w as i64).contains(&x) && (0..h as i64).contains(&y)).then_some(y as usize * w + x as usize)
+        })
+    };
+    let depth_of = |hit: &Hit| (hit.position - camera.eye).dot(camera.forward());
+    let mut found =
+        Agreement { both: 0, outline_off: 0, place_p99: 0.0, far: 0.0, texels_p99: 0.0, depth_p99: 0.0 };
+    let (mut places, mut texel_errors, mut depth_errors, mut far) = (Vec::new(), Vec::new(), Vec::new(), 0);
+    for at in 0..w * h {
+        let (seen, hit) = (mask[at] == 1, &truth[at]);
+        if seen != hit.is_some() && around(at).all(|near| truth[near].is_some() == hit.is_some()) {
+            found.outline_off += 1;
+        }
+        let (true, Some(hit)) = (seen, hit) else { continue };
+        found.both += 1;
+        let depth = depth_of(hit);
+        let place = Vec3::from_slice(&positions[3 * at..]).as_dvec3();
+        let off = (place - hit.position).length() / (depth * pixel);
+        far += usize::from(off > 1.0);
+        let smooth = around(at).all(|near| {
+            truth[near].is_some_and(|near| (depth_of(&near) - depth).abs() < 6.0 * depth * pixel)
+        });
+        if smooth {
+            let uv = Vec2::from_slice(&uvs[2 * at..]).as_dvec2() - hit.uv;
+            places.push(off);
+            // On a seam the same place has two.
+            let turns = uv - uv.round();
+            texel_errors.push((turns.x * texels[0] as f64).hypot(turns.y * texels[1] as f64));
+            depth_errors.push((f64::from(depths[at]) - depth).abs() / depth);
+        }
+    }
+    found.far = far as f64 / found.both.max(1) as f64;
+    found.place_p99 = percentile(places, 0.99);
+    found.texels_p99 = percentile(texel_errors, 0.99);
+    found.depth_p99 = percentile(depth_errors, 0.99);
+    found
+}
+
+/// What a picture shows, as if it were the truth. It needs the outputs mask, position, uv and height.
+pub fn as_truth(frame: &Frame, camera: &Camera) -> Vec<Option<Hit>> {
+    let (mask, heights) = (frame.aovs.mask.as_ref().unwrap(), frame.aovs.height.as_ref().unwrap());
+    let (positions, uvs) = (frame.aovs.position.as_ref().unwrap(), frame.aovs.uv.as_ref().unwrap());
+    let hit = |at: usize| {
+        let position = Vec3::from_slice(&positions[3 * at..]).as_dvec3();
+        let uv = Vec2::from_slice(&uvs[2 * at..]).as_dvec2();
+        Hit { t: (position - camera.eye).length(), position, uv, height: f64::from(heights[at]) }
+    };
+    (0..mask.len()).map(|at| (mask[at] == 1).then(|| hit(at))).collect()
+}
+
+/// A line of a table.
+pub fn row(name: &str, base: f32, found: &Agreement) {
+    let Agreement { both, outline_off, place_p99, far, texels_p99, depth_p99 } = found;
+    println!(
+        "| {name} | {base} | {both} | {outline_off} | {place_p99:.3} | {:.2} % | {texels_p99:.3} | {depth_p99:.1e} |",
+        100.0 * far
+    );
+}
+
+/// A PNG-less way to look at a picture: binary PPM, to the folder of BUMPWGPU_PICTURES if that is set.
+pub fn show(frame: &Frame, name: &str) {
+    let Ok(folder) = std::env::var("BUMPWGPU_PICTURES") else { return };
+    let mut bytes = format!("P6 {} {} 255\n", frame.width, frame.height).into_bytes();
+    bytes.extend(frame.color.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]));
+    std::fs::write(std::path::Path::new(&folder).join(format!("{name}.ppm")), bytes).unwrap();
+}
+
+/// A camera that looks at the origin.
+pub fn from(eye: [f64; 3]) -> Camera {
+    Camera::look_at(DVec3::from(eye), DVec3::ZERO)
+}

@@ -1,0 +1,147 @@
+//! Relief traced through the shell against rays through the displaced surface in double precision, and against
+//! displacement.
+//!
+//! `cargo test -p render --release --test silhouettes -- --nocapture` prints the tables of docs/displacement.md.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use common::agree::{agreement, as_truth, from, row, show};
+use common::shapes::{LIGHT, SIZE, heights, picture, scene_picture, shapes};
+use common::truth::Truth;
+use glam::{DVec3, Vec3};
+use mesh::Mesh;
+use render::{Camera, Draw, Material};
+
+#[test]
+fn relief_in_the_shell_is_the_displaced_surface() {
+    let Some(device) = common::device() else { return };
+    println!(
+        "| mesh | base | pixels | outline off | place p99, pixels | off by a pixel | uv p99, texels | depth p99 |"
+    );
+    println!("|---|---|---|---|---|---|---|---|");
+    for (name, mesh, texels, eye) in shapes() {
+        // Hard edges are bridged by strips that the truth, triangle by triangle, does not have.
+        if name == "cube" {
+            continue;
+        }
+        for base in [0.0, 1.0] {
+            let field = heights(texels, 0.08, base);
+            let camera = from(eye);
+            let judge = Truth::new(&mesh, &field);
+            let truth = judge.picture(&camera, SIZE);
+            let frame = picture(&device, &mesh, &field, camera, "exact", true);
+            show(&frame, &format!("shell_{name}_{base}"));
+            let found = agreement(&frame, &truth, &camera, texels);
+            row(name, base, &found);
+            assert!(found.both > 1500 && found.outline_off == 0, "{name} {base}: {found:?}");
+            assert!(found.place_p99 < 0.06 && found.texels_p99 < 0.04, "{name} {base}: {found:?}");
+            assert!(found.far < 0.001 && found.depth_p99 < 4e-4, "{name} {base}: {found:?}");
+            assert_eq!(frame.stats.pixels_unconverged, 0);
+
+            // Shadows, away from where the light only grazes.
+            let (shadow, normals) = (frame.aovs.shadow.unwrap(), frame.aovs.normal.unwrap());
+            let to_light = -LIGHT.as_dvec3().normalize();
+            let lit = (0..truth.len()).filter(|&at| {
+                let normal = Vec3::from_slice(&normals[3 * at..]).as_dvec3();
+                at % 3 == 0 && normal.dot(to_light) > 0.1
+            });
+            let (mut seen, mut wrong, mut dark) = (0, 0, 0);
+            for at in lit {
+                let Some(hit) = truth[at] else { continue };
+                let blocked = judge.blocked(hit.position, to_light, 1e-4);
+                seen += 1;
+                dark += usize::from(blocked);
+                wrong += usize::from(blocked != (shadow[at] > 0.5));
+            }
+            println!("{name} {base}: {dark} of {seen} pixels in shadow, {wrong} wrong");
+            assert!(seen > 500 && wrong * 100 < seen, "{name} {base}: {wrong} of {seen}");
+        }
+    }
+}
+
+/// A relief whose rays are straight in a frame of their own must be found out, and one a tenth too deep.
+#[test]
+fn what_is_not_the_displaced_surface_is_noticed() {
+    let Some(device) = common::device() else { return };
+    let (_, mesh, texels, eye) = shapes().into_iter().nth(2).unwrap();
+    let (field, camera) = (heights(texels, 0.08, 0.0), from(eye));
+    let truth = Truth::new(&mesh, &field).picture(&camera, SIZE);
+    let deeper = picture(&device, &mesh, &heights(texels, 0.088, 0.0), camera, "exact", true);
+    let deeper = agreement(&deeper, &truth, &camera, texels);
+    assert!(deeper.place_p99 > 1.0, "{deeper:?}");
+    let straight = picture(&device, &mesh, &field, camera, "exact", false);
+    let straight = agreement(&straight, &truth, &camera, texels);
+    assert!(straight.outline_off > 200 && straight.place_p99 > 1.0, "{straight:?}");
+}
+
+#[test]
+fn outlines_are_those_of_displacement() {
+    let Some(device) = common::device() else { return };
+    for (name, mesh, texels, eye) in shapes() {
+        for base in [0.0, 1.0] {
+            let (field, camera) = (heights(texels, 0.08, base), from(eye));
+            let displaced = picture(&device, &mesh, &field, camera, "displacement", false);
+            let traced = picture(&device, &mesh, &field, camera, "exact", true);
+            let found = agreement(&traced, &as_truth(&displaced, &camera), &camera, texels);
+            row(name, base, &found);
+            // Along hard edges the outermost ring of micro-polygons leans over, a pixel wide. Carved into a cube,
+            // the sheets of its sides run through each other and end in fins that only that ring bounds.
+            let [outline, place, far] = match (name, base) {
+                ("cube", 1.0) => [2.0, f64::INFINITY, 0.06],
+                ("cube", _) => [0.0, 1.0, 0.03],
+                _ => [0.0, 0.5, 0.01],
+            };
+            assert!(found.both > 1500 && found.outline_off as f64 <= outline, "{name} {base}: {found:?}");
+            assert!(found.place_p99 < place && found.far < far, "{name} {base}: {found:?}");
+        }
+    }
+}
+
+#[test]
+fn the_camera_may_stand_in_the_shell() {
+    let Some(device) = common::device() else { return };
+    let (mesh, texels) = (Mesh::quad(1.0).unwrap(), [48, 48]);
+    let field = heights(texels, 0.08, 0.0);
+    let (u, v) = (0.47, 0.83);
+    let above = 0.08 * field.height_at(u, v) + 0.004;
+    let eye = DVec3::new(u - 0.5, 0.5 - v, above);
+    assert!(above < 0.08 * 0.95, "below the lid");
+    for target in [DVec3::new(0.1, 0.4, 0.03), DVec3::new(-0.3, -0.3, 0.02)] {
+        let camera = Camera { up: DVec3::Z, ..Camera::look_at(eye, target) };
+        let truth = Truth::new(&mesh, &field).picture(&camera, SIZE);
+        let frame = picture(&device, &mesh, &field, camera, "exact", true);
+        show(&frame, &format!("inside_{}", target.x));
+        let found = agreement(&frame, &truth, &camera, texels);
+        row("inside", 0.0, &found);
+        assert!(found.both > 1500 && found.outline_off == 0, "{found:?}");
+        assert!(found.place_p99 < 0.1 && found.far < 0.01, "{found:?}");
+    }
+}
+
+#[test]
+fn reliefs_cut_into_each_other_where_they_are() {
+    let Some(device) = common::device() else { return };
+    let (ball, plate) = (Mesh::sphere(0.4, 48).unwrap(), Mesh::quad(1.2).unwrap());
+    let (field, camera) = (heights([128, 64], 0.08, 0.5), from([0.5, 0.7, 1.3]));
+    let material = Material::new(std::sync::Arc::clone(&field));
+    let draws = vec![Draw::new(&ball, &material), Draw::new(&plate, &material)];
+    let frame = scene_picture(&device, draws, camera, "exact", true);
+    show(&frame, "cut");
+    let [a, b] = [&ball, &plate].map(|mesh| Truth::new(mesh, &field).picture(&camera, SIZE));
+    let nearest: Vec<_> = a
+        .iter()
+        .zip(&b)
+        .map(|(&a, &b)| match (a, b) {
+            (Some(a), Some(b)) => Some(if a.t < b.t { a } else { b }),
+            (a, b) => a.or(b),
+        })
+        .collect();
+    let balls =
+        nearest.iter().zip(&a).filter(|(n, a)| n.is_some() && n.map(|n| n.t) == a.map(|a| a.t)).count();
+    assert!(balls > 500, "the ball stands out of the plate: {balls}");
+    let found = agreement(&frame, &nearest, &camera, [128, 64]);
+    row("ball in plate", 0.5, &found);
+    assert!(found.outline_off == 0 && found.far < 0.005, "{found:?}");
+}
