@@ -356,6 +356,9 @@ def render(
     shadows: Annotated[
         bool | None, typer.Option(help="Self-shadowing.", show_default="where the technique can")
     ] = None,
+    silhouettes: Annotated[
+        bool, typer.Option("--silhouettes", help="Outlines, depth and shadows of displacement, with exact.")
+    ] = False,
     aovs: Annotated[
         str, typer.Option(help=f"Further outputs, as npy beside the picture: {', '.join(AOVS)}.")
     ] = "",
@@ -413,6 +416,7 @@ def render(
                 technique=chosen,
                 size=size,
                 shadows=shadows,
+                silhouettes=silhouettes,
                 aovs=outputs,
             )
         files = [frame.save(output), *_save_aovs(frame.aovs, output)]
