@@ -50,7 +50,9 @@ SIGNATURES = {
     "Light.directional": "direction color intensity",
     "Light.point": "position color intensity",
     "Material": "height albedo normal * specular shininess normal_convention double_sided",
-    "render": "mesh material * camera lights technique size shadows aovs device ambient background",
+    "render": (
+        "mesh material * camera lights technique size shadows silhouettes aovs device ambient background"
+    ),
     "compare": "source techniques * elevations formats device rays repeats seed progress",
     "dequantise": "source * bits progress **options",
     "tile_report": "source **options",

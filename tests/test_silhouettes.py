@@ -43,7 +43,7 @@ def test_traced_relief_has_the_outline_and_depth_of_displacement() -> None:
     assert not (a & ~grown(b)).any()
     assert not (b & ~grown(a)).any()
     both = a & b
-    depth = np.abs(real.aovs["depth"] - traced.aovs["depth"])[both]
+    depth = np.abs(real.aovs["depth"][both] - traced.aovs["depth"][both])
     assert np.percentile(depth, 98) < 2 * 2 * np.tan(np.radians(22.5)) / 80
     assert (real.aovs["shadow"][both] != traced.aovs["shadow"][both]).mean() < 0.02
     # Negative control: on the mesh's own outline it is another picture.
