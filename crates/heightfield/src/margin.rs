@@ -10,26 +10,30 @@ use crate::pyramid::{Level, MaxPyramid};
 
 /// The drop from the highest point that is free of surface under each node and around it.
 ///
-/// Level `margin` is the finest. Its node covers `2^margin` cells a side and says how far a point over
-/// it, or up to `2^margin` cells beside it, can be below [`MaxPyramid::highest`] and still be above
-/// the surface. Nodes of higher levels are the smallest of their four children. So positions may be
-/// off by the margin, by rounding or because they stand for a bundle of rays.
+/// A node of level `k` covers `2^k` cells a side and says how far a point over it, or up to
+/// `2^margin` cells beside it, can be below [`MaxPyramid::highest`] and still be above the surface. Nodes
+/// of higher levels are the smallest of their four children. So positions may be off by the margin, by
+/// rounding or because they stand for a bundle of rays.
 #[derive(Debug, Clone)]
 pub struct MarginPyramid {
     drops: Vec<f32>,
-    /// Where each level starts in the drops; below the margin, where that starts.
+    /// Where each level starts in the drops; below the finest, where that starts.
     offsets: [i32; LEVELS],
     /// Nodes along x at each level.
     strides: [i32; LEVELS],
     margin: usize,
+    finest: usize,
     top: usize,
 }
 
 /// Most levels kept. The coarsest may have more than one node.
 pub const LEVELS: usize = 16;
 
-/// The margins of [`Margins`], as levels.
-const KEPT: [usize; 4] = [0, 2, 4, 6];
+/// The largest margin of [`Margins`], as a level.
+const WIDEST: usize = 6;
+
+/// The finest level kept: where two cells across are not free, single cells are looked at themselves.
+const FINEST: usize = 1;
 
 /// Pyramids of several margins, for bundles of rays of several widths.
 #[derive(Debug)]
@@ -38,12 +42,11 @@ pub struct Margins {
 }
 
 impl Margins {
-    /// Builds all of them; 1.43 floats a cell.
+    /// Builds all of them; 0.78 floats a cell.
     pub fn build(field: &HeightField) -> Self {
         let pyramid = field.pyramid();
-        let highest = pyramid.levels().len() - 1;
-        let kept = KEPT.into_iter().filter(|&margin| margin <= highest);
-        Self { pyramids: kept.map(|margin| MarginPyramid::build(field, pyramid, margin)).collect() }
+        let widest = WIDEST.min(pyramid.levels().len() - 1);
+        Self { pyramids: (0..=widest).map(|margin| MarginPyramid::build(field, pyramid, margin)).collect() }
     }
 
     /// The one with a margin of one cell.
@@ -63,51 +66,48 @@ impl Margins {
 pub const SLACK: f32 = 1e-6;
 
 impl MarginPyramid {
-    /// Builds the levels from `margin` on; `4/3 / 4^margin` floats a cell.
+    /// Builds the levels from `margin` on, or from [`FINEST`].
     fn build(field: &HeightField, pyramid: &MaxPyramid, margin: usize) -> Self {
-        let top = (pyramid.levels().len() - 1).min(LEVELS - 1);
+        let levels = pyramid.levels();
+        let top = (levels.len() - 1).min(LEVELS - 1);
         let margin = margin.min(top);
-        let base = &pyramid.levels()[margin];
-        let [w, h] = base.nodes;
-        let highest = pyramid.highest();
-        let source = &pyramid.maxima()[base.offset..base.offset + w * h];
-        let neighbours_x = Neighbours::new(field.cells()[0], w, margin, field.is_periodic());
-        let neighbours_y = Neighbours::new(field.cells()[1], h, margin, field.is_periodic());
-        let mut widened = vec![0.0_f32; w * h];
-        widened.par_chunks_mut(w).zip(source.par_chunks(w)).for_each(|(to, from)| neighbours_x.row(from, to));
-        let total: usize =
-            pyramid.levels()[margin..=top].iter().map(|level| level.nodes[0] * level.nodes[1]).sum();
-        let mut drops = vec![0.0_f32; total];
-        drops[..w * h].par_chunks_mut(w).enumerate().for_each(|(b, to)| {
-            to.copy_from_slice(&widened[b * w..][..w]);
-            for other in neighbours_y.of(b) {
-                for (to, &from) in to.iter_mut().zip(&widened[other * w..][..w]) {
-                    *to = if *to > from { *to } else { from };
-                }
-            }
-            for to in to.iter_mut() {
-                *to = (highest - *to - SLACK).max(0.0);
-            }
-        });
+        let finest = margin.max(FINEST).min(top);
+        let total = levels[finest..=top].iter().map(|level| level.nodes[0] * level.nodes[1]).sum();
+        let widened = widen(field, pyramid, margin);
+        let mut drops = Vec::with_capacity(total);
+        if finest == margin {
+            drops = widened;
+            drops.reserve_exact(total - drops.len());
+        } else {
+            drops.resize(levels[finest].nodes[0] * levels[finest].nodes[1], 0.0);
+            reduce(&widened, levels[margin].nodes, &mut drops, levels[finest].nodes);
+        }
         let (mut offsets, mut strides) = ([0; LEVELS], [0; LEVELS]);
-        strides[..=margin].fill(w as i32);
+        strides[..=finest].fill(levels[finest].nodes[0] as i32);
         let mut at = 0;
-        for (k, pair) in pyramid.levels()[..=top].windows(2).enumerate().skip(margin) {
+        for (k, pair) in levels[..=top].windows(2).enumerate().skip(finest) {
             let (below, above): (&Level, &Level) = (&pair[0], &pair[1]);
-            let from_len = below.nodes[0] * below.nodes[1];
-            let (head, tail) = drops.split_at_mut(at + from_len);
-            reduce(&head[at..], below.nodes, &mut tail[..above.nodes[0] * above.nodes[1]], above.nodes);
-            at += from_len;
+            let next = drops.len();
+            drops.resize(next + above.nodes[0] * above.nodes[1], 0.0);
+            let (head, tail) = drops.split_at_mut(next);
+            reduce(&head[at..], below.nodes, tail, above.nodes);
+            at = next;
             offsets[k + 1] = at as i32;
             strides[k + 1] = above.nodes[0] as i32;
         }
-        Self { drops, offsets, strides, margin, top }
+        Self { drops, offsets, strides, margin, finest, top }
     }
 
     /// Free drops of all levels, each row by row.
     #[inline(always)]
     pub fn drops(&self) -> &[f32] {
         &self.drops
+    }
+
+    /// The number of the last node.
+    #[inline(always)]
+    pub fn last(&self) -> i32 {
+        self.drops.len() as i32 - 1
     }
 
     /// Where level `k` starts.
@@ -122,10 +122,16 @@ impl MarginPyramid {
         &self.strides
     }
 
-    /// The finest level.
+    /// The margin is `2^margin` cells wide.
     #[inline(always)]
     pub fn margin(&self) -> usize {
         self.margin
+    }
+
+    /// The finest level.
+    #[inline(always)]
+    pub fn finest(&self) -> usize {
+        self.finest
     }
 
     /// The coarsest level, a single node.
@@ -133,6 +139,31 @@ impl MarginPyramid {
     pub fn top(&self) -> usize {
         self.top
     }
+}
+
+/// The drops of the level whose nodes are as wide as the margin.
+fn widen(field: &HeightField, pyramid: &MaxPyramid, margin: usize) -> Vec<f32> {
+    let base = &pyramid.levels()[margin];
+    let [w, h] = base.nodes;
+    let highest = pyramid.highest();
+    let source = &pyramid.maxima()[base.offset..base.offset + w * h];
+    let neighbours_x = Neighbours::new(field.cells()[0], w, margin, field.is_periodic());
+    let neighbours_y = Neighbours::new(field.cells()[1], h, margin, field.is_periodic());
+    let mut along_x = vec![0.0_f32; w * h];
+    along_x.par_chunks_mut(w).zip(source.par_chunks(w)).for_each(|(to, from)| neighbours_x.row(from, to));
+    let mut drops = vec![0.0_f32; w * h];
+    drops.par_chunks_mut(w).enumerate().for_each(|(b, to)| {
+        to.copy_from_slice(&along_x[b * w..][..w]);
+        for other in neighbours_y.of(b) {
+            for (to, &from) in to.iter_mut().zip(&along_x[other * w..][..w]) {
+                *to = if *to > from { *to } else { from };
+            }
+        }
+        for to in to.iter_mut() {
+            *to = (highest - *to - SLACK).max(0.0);
+        }
+    });
+    drops
 }
 
 fn reduce(from: &[f32], [w, h]: [usize; 2], to: &mut [f32], [across, _]: [usize; 2]) {
@@ -239,7 +270,7 @@ mod tests {
                 let levels = field.pyramid().levels();
                 for bound in &Margins::build(&field).pyramids {
                     let margin = 1_i64 << bound.margin();
-                    for (k, level) in levels.iter().enumerate().skip(bound.margin()) {
+                    for (k, level) in levels.iter().enumerate().skip(bound.finest()) {
                         for b in 0..level.nodes[1] {
                             for a in 0..level.nodes[0] {
                                 let side = |a: usize, n: usize| {

@@ -81,6 +81,10 @@ pub(crate) fn load<L: Lanes>(rays: RayArray<'_>, at: usize) -> [L::D; 3] {
         out
     }
     match rays {
+        RayArray::F32(rays) if rays.len() >= 3 * (at + L::WIDTH) => {
+            let [u, v, z] = L::load_triples(&rays[3 * at..]);
+            [L::widen(u), L::widen(v), L::widen(z)]
+        }
         RayArray::F32(rays) => {
             let [u, v, z] = split(rays, at, L::WIDTH);
             [L::widen(L::load(&u)), L::widen(L::load(&v)), L::widen(L::load(&z))]

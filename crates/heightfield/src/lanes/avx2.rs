@@ -3,7 +3,7 @@
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
-use super::Lanes;
+use super::{Lanes, SWAP_ONES, SWAP_PAIRS};
 
 /// 8 lanes with AVX2.
 #[derive(Debug, Clone, Copy)]
@@ -124,6 +124,17 @@ impl Lanes for Avx2 {
         F(unsafe { _mm256_loadu_ps(from[..8].as_ptr()) })
     }
     #[inline(always)]
+    fn load_triples(from: &[f32]) -> [F; 3] {
+        let from = &from[..24];
+        let mut parts = [[0.0; 8]; 3];
+        for lane in 0..8 {
+            for (k, part) in parts.iter_mut().enumerate() {
+                part[lane] = from[3 * lane + k];
+            }
+        }
+        [Self::load(&parts[0]), Self::load(&parts[1]), Self::load(&parts[2])]
+    }
+    #[inline(always)]
     fn store(x: F, to: &mut [f32]) {
         unsafe { _mm256_storeu_ps(to[..8].as_mut_ptr(), x.0) }
     }
@@ -155,6 +166,20 @@ impl Lanes for Avx2 {
         F(unsafe { _mm256_max_ps(a.0, b.0) })
     }
     #[inline(always)]
+    fn least_of_four(x: F) -> F {
+        unsafe {
+            let x = Self::min(x, F(_mm256_permute_ps::<SWAP_ONES>(x.0)));
+            Self::min(x, F(_mm256_permute_ps::<SWAP_PAIRS>(x.0)))
+        }
+    }
+    #[inline(always)]
+    fn largest_of_four(x: F) -> F {
+        unsafe {
+            let x = Self::max(x, F(_mm256_permute_ps::<SWAP_ONES>(x.0)));
+            Self::max(x, F(_mm256_permute_ps::<SWAP_PAIRS>(x.0)))
+        }
+    }
+    #[inline(always)]
     fn abs(x: F) -> F {
         F(unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), x.0) })
     }
@@ -181,6 +206,13 @@ impl Lanes for Avx2 {
     #[inline(always)]
     fn select(mask: M, yes: F, no: F) -> F {
         F(unsafe { _mm256_blendv_ps(no.0, yes.0, _mm256_castsi256_ps(mask.0)) })
+    }
+    #[inline(always)]
+    fn times_power(x: F, power: I) -> F {
+        unsafe {
+            let exponent = _mm256_slli_epi32::<23>(power.0);
+            F(_mm256_castsi256_ps(_mm256_add_epi32(_mm256_castps_si256(x.0), exponent)))
+        }
     }
     #[inline(always)]
     fn to_int(x: F) -> I {
@@ -219,10 +251,6 @@ impl Lanes for Avx2 {
         I(unsafe { _mm256_min_epi32(a.0, b.0) })
     }
     #[inline(always)]
-    fn max_int(a: I, b: I) -> I {
-        I(unsafe { _mm256_max_epi32(a.0, b.0) })
-    }
-    #[inline(always)]
     fn lt_int(a: I, b: I) -> M {
         M(unsafe { _mm256_cmpgt_epi32(b.0, a.0) })
     }
@@ -238,14 +266,6 @@ impl Lanes for Avx2 {
     #[inline(always)]
     fn select_int(mask: M, yes: I, no: I) -> I {
         I(unsafe { _mm256_blendv_epi8(no.0, yes.0, mask.0) })
-    }
-    #[inline(always)]
-    fn shift_left(a: I, by: I) -> I {
-        I(unsafe { _mm256_sllv_epi32(a.0, by.0) })
-    }
-    #[inline(always)]
-    fn shift_right(a: I, by: I) -> I {
-        I(unsafe { _mm256_srlv_epi32(a.0, by.0) })
     }
     #[inline(always)]
     fn lookup(table: &[i32; 16], at: I) -> I {

@@ -3,7 +3,7 @@
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
-use super::Lanes;
+use super::{Lanes, SWAP_ONES, SWAP_PAIRS};
 
 /// 16 lanes with AVX-512.
 #[derive(Debug, Clone, Copy)]
@@ -68,6 +68,30 @@ impl Not for M {
 /// Rounding towards minus infinity, without exceptions.
 const DOWN: i32 = _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC;
 
+/// How two permutations collect every third of 48 numbers: the first those of the first two vectors,
+/// the second the rest.
+static TRIPLES: [[[i32; 16]; 2]; 3] = [triples(0), triples(1), triples(2)];
+
+const fn triples(first: usize) -> [[i32; 16]; 2] {
+    let mut order = [[0; 16]; 2];
+    let mut lane = 0;
+    while lane < 16 {
+        let at = 3 * lane + first;
+        order[0][lane] = if at < 32 { at as i32 } else { 0 };
+        order[1][lane] = if at < 32 { lane as i32 } else { at as i32 - 16 };
+        lane += 1;
+    }
+    order
+}
+
+#[inline(always)]
+fn third(a: __m512, b: __m512, c: __m512, order: &[[i32; 16]; 2]) -> F {
+    unsafe {
+        let low = _mm512_permutex2var_ps(a, _mm512_loadu_si512(order[0].as_ptr().cast()), b);
+        F(_mm512_permutex2var_ps(low, _mm512_loadu_si512(order[1].as_ptr().cast()), c))
+    }
+}
+
 impl Lanes for Avx512 {
     const WIDTH: usize = 16;
     type F = F;
@@ -82,6 +106,16 @@ impl Lanes for Avx512 {
     #[inline(always)]
     fn load(from: &[f32]) -> F {
         F(unsafe { _mm512_loadu_ps(from[..16].as_ptr()) })
+    }
+    #[inline(always)]
+    fn load_triples(from: &[f32]) -> [F; 3] {
+        let from = from[..48].as_ptr();
+        unsafe {
+            let a = _mm512_loadu_ps(from);
+            let b = _mm512_loadu_ps(from.add(16));
+            let c = _mm512_loadu_ps(from.add(32));
+            [third(a, b, c, &TRIPLES[0]), third(a, b, c, &TRIPLES[1]), third(a, b, c, &TRIPLES[2])]
+        }
     }
     #[inline(always)]
     fn store(x: F, to: &mut [f32]) {
@@ -110,6 +144,20 @@ impl Lanes for Avx512 {
         F(unsafe { _mm512_max_ps(a.0, b.0) })
     }
     #[inline(always)]
+    fn least_of_four(x: F) -> F {
+        unsafe {
+            let x = Self::min(x, F(_mm512_permute_ps::<SWAP_ONES>(x.0)));
+            Self::min(x, F(_mm512_permute_ps::<SWAP_PAIRS>(x.0)))
+        }
+    }
+    #[inline(always)]
+    fn largest_of_four(x: F) -> F {
+        unsafe {
+            let x = Self::max(x, F(_mm512_permute_ps::<SWAP_ONES>(x.0)));
+            Self::max(x, F(_mm512_permute_ps::<SWAP_PAIRS>(x.0)))
+        }
+    }
+    #[inline(always)]
     fn abs(x: F) -> F {
         F(unsafe { _mm512_abs_ps(x.0) })
     }
@@ -136,6 +184,13 @@ impl Lanes for Avx512 {
     #[inline(always)]
     fn select(mask: M, yes: F, no: F) -> F {
         F(unsafe { _mm512_mask_blend_ps(mask.0, no.0, yes.0) })
+    }
+    #[inline(always)]
+    fn times_power(x: F, power: I) -> F {
+        unsafe {
+            let exponent = _mm512_slli_epi32::<23>(power.0);
+            F(_mm512_castsi512_ps(_mm512_add_epi32(_mm512_castps_si512(x.0), exponent)))
+        }
     }
     #[inline(always)]
     fn to_int(x: F) -> I {
@@ -172,10 +227,6 @@ impl Lanes for Avx512 {
         I(unsafe { _mm512_min_epi32(a.0, b.0) })
     }
     #[inline(always)]
-    fn max_int(a: I, b: I) -> I {
-        I(unsafe { _mm512_max_epi32(a.0, b.0) })
-    }
-    #[inline(always)]
     fn lt_int(a: I, b: I) -> M {
         M(unsafe { _mm512_cmplt_epi32_mask(a.0, b.0) })
     }
@@ -190,14 +241,6 @@ impl Lanes for Avx512 {
     #[inline(always)]
     fn select_int(mask: M, yes: I, no: I) -> I {
         I(unsafe { _mm512_mask_blend_epi32(mask.0, no.0, yes.0) })
-    }
-    #[inline(always)]
-    fn shift_left(a: I, by: I) -> I {
-        I(unsafe { _mm512_sllv_epi32(a.0, by.0) })
-    }
-    #[inline(always)]
-    fn shift_right(a: I, by: I) -> I {
-        I(unsafe { _mm512_srlv_epi32(a.0, by.0) })
     }
     #[inline(always)]
     fn lookup(table: &[i32; 16], at: I) -> I {

@@ -45,6 +45,12 @@ macro_rules! wide_operators {
     )* };
 }
 
+/// Orders of four numbers in which each pair, and both pairs, are swapped.
+#[cfg(target_arch = "x86_64")]
+const SWAP_ONES: i32 = 0b10_11_00_01;
+#[cfg(target_arch = "x86_64")]
+const SWAP_PAIRS: i32 = 0b01_00_11_10;
+
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 #[cfg(target_arch = "x86_64")]
@@ -76,6 +82,9 @@ pub trait Lanes: Copy + Send + Sync + 'static {
     fn splat(x: f32) -> Self::F;
     /// The first [`Self::WIDTH`] numbers of a slice. Panics when it is shorter.
     fn load(from: &[f32]) -> Self::F;
+    /// Every third number from the first, second and third on. Panics when the slice is shorter than three
+    /// times [`Self::WIDTH`].
+    fn load_triples(from: &[f32]) -> [Self::F; 3];
     /// Writes the lanes to the start of a slice. Panics when it is shorter.
     fn store(x: Self::F, to: &mut [f32]);
     /// Writes the chosen lanes one after the other and counts them; behind them the slice is overwritten
@@ -90,6 +99,10 @@ pub trait Lanes: Copy + Send + Sync + 'static {
     fn min(a: Self::F, b: Self::F) -> Self::F;
     /// The larger.
     fn max(a: Self::F, b: Self::F) -> Self::F;
+    /// In each lane the least of its group of four. With fewer lanes than four, of all.
+    fn least_of_four(x: Self::F) -> Self::F;
+    /// In each lane the largest of its group of four. With fewer lanes than four, of all.
+    fn largest_of_four(x: Self::F) -> Self::F;
     /// Without its sign.
     fn abs(x: Self::F) -> Self::F;
     /// The next whole number below.
@@ -104,6 +117,8 @@ pub trait Lanes: Copy + Send + Sync + 'static {
     fn le(a: Self::F, b: Self::F) -> Self::M;
     /// `yes` where the mask is set, `no` elsewhere.
     fn select(mask: Self::M, yes: Self::F, no: Self::F) -> Self::F;
+    /// `x * 2^power` by adding to the exponent; `x` and the result are normal numbers.
+    fn times_power(x: Self::F, power: Self::I) -> Self::F;
     /// Whole numbers as `i32`; anything else gives some `i32`.
     fn to_int(x: Self::F) -> Self::I;
     /// `i32` as `f32`.
@@ -121,8 +136,6 @@ pub trait Lanes: Copy + Send + Sync + 'static {
     fn min_unsigned(a: Self::I, b: Self::I) -> Self::I;
     /// The smaller.
     fn min_int(a: Self::I, b: Self::I) -> Self::I;
-    /// The larger.
-    fn max_int(a: Self::I, b: Self::I) -> Self::I;
     /// `a < b`.
     fn lt_int(a: Self::I, b: Self::I) -> Self::M;
     /// `a == b`.
@@ -131,10 +144,6 @@ pub trait Lanes: Copy + Send + Sync + 'static {
     fn odd(a: Self::I) -> Self::M;
     /// `yes` where the mask is set, `no` elsewhere.
     fn select_int(mask: Self::M, yes: Self::I, no: Self::I) -> Self::I;
-    /// `a << by`, `by` in 0..32.
-    fn shift_left(a: Self::I, by: Self::I) -> Self::I;
-    /// `a >> by` without sign, `by` in 0..32.
-    fn shift_right(a: Self::I, by: Self::I) -> Self::I;
     /// `table[at]`; only the low four bits of `at` count.
     fn lookup(table: &[i32; 16], at: Self::I) -> Self::I;
 

@@ -90,6 +90,11 @@ impl<const N: usize> Lanes for Portable<N> {
         Array(from_fn(|i| from[i]))
     }
     #[inline(always)]
+    fn load_triples(from: &[f32]) -> [Self::F; 3] {
+        let from = &from[..3 * N];
+        from_fn(|k| Array(from_fn(|lane| from[3 * lane + k])))
+    }
+    #[inline(always)]
     fn store(x: Self::F, to: &mut [f32]) {
         to[..N].copy_from_slice(&x.0);
     }
@@ -123,6 +128,14 @@ impl<const N: usize> Lanes for Portable<N> {
         zip(a, b, |a, b| if a > b { a } else { b })
     }
     #[inline(always)]
+    fn least_of_four(x: Self::F) -> Self::F {
+        Array(from_fn(|i| x.0[i & !3..N.min((i & !3) + 4)].iter().copied().fold(f32::INFINITY, f32::min)))
+    }
+    #[inline(always)]
+    fn largest_of_four(x: Self::F) -> Self::F {
+        Array(from_fn(|i| x.0[i & !3..N.min((i & !3) + 4)].iter().copied().fold(f32::NEG_INFINITY, f32::max)))
+    }
+    #[inline(always)]
     fn abs(x: Self::F) -> Self::F {
         map(x, f32::abs)
     }
@@ -149,6 +162,11 @@ impl<const N: usize> Lanes for Portable<N> {
     #[inline(always)]
     fn select(mask: Self::M, yes: Self::F, no: Self::F) -> Self::F {
         choose(mask, yes, no)
+    }
+    #[inline(always)]
+    fn times_power(x: Self::F, power: Self::I) -> Self::F {
+        let scale = |x: f32, power: i32| f32::from_bits(x.to_bits().wrapping_add_signed(power << 23));
+        Array(from_fn(|i| scale(x.0[i], power.0[i])))
     }
     #[inline(always)]
     fn to_int(x: Self::F) -> Self::I {
@@ -185,10 +203,6 @@ impl<const N: usize> Lanes for Portable<N> {
         zip(a, b, i32::min)
     }
     #[inline(always)]
-    fn max_int(a: Self::I, b: Self::I) -> Self::I {
-        zip(a, b, i32::max)
-    }
-    #[inline(always)]
     fn lt_int(a: Self::I, b: Self::I) -> Self::M {
         zip(a, b, |a, b| a < b)
     }
@@ -203,14 +217,6 @@ impl<const N: usize> Lanes for Portable<N> {
     #[inline(always)]
     fn select_int(mask: Self::M, yes: Self::I, no: Self::I) -> Self::I {
         choose(mask, yes, no)
-    }
-    #[inline(always)]
-    fn shift_left(a: Self::I, by: Self::I) -> Self::I {
-        zip(a, by, |a, by| a.wrapping_shl(by as u32))
-    }
-    #[inline(always)]
-    fn shift_right(a: Self::I, by: Self::I) -> Self::I {
-        zip(a, by, |a, by| (a as u32).wrapping_shr(by as u32) as i32)
     }
     #[inline(always)]
     fn lookup(table: &[i32; 16], at: Self::I) -> Self::I {

@@ -59,14 +59,13 @@ impl Kernel for Everything<'_> {
             let (i, j) = (L::to_int(L::floor(a)), L::to_int(L::floor(b)));
             let five = L::splat_int(5);
             let low = j & L::splat_int(7);
-            for x in [i + j, i - j, i * j, i & j, L::min_unsigned(i, j), L::min_int(i, j), L::max_int(i, j)] {
+            for x in [i + j, i - j, i * j, i & j, L::min_unsigned(i, j), L::min_int(i, j)] {
                 int(x, &mut results);
             }
             int(L::select_int(less, i, five), &mut results);
-            int(L::shift_left(i, low), &mut results);
-            int(L::shift_right(i, low), &mut results);
             let table = [3, 1, 4, 1, 5, 9, 2, 6, 5, 3, 5, 8, 9, 7, 9, 3];
             int(L::lookup(&table, i), &mut results);
+            float(L::times_power(a, L::splat_int(-3)), &mut results);
             mask(L::lt_int(i, j), &mut results);
             mask(L::eq_int(i, low), &mut results);
             let at = i & L::splat_int(63);
@@ -94,6 +93,18 @@ impl Kernel for Everything<'_> {
             for (k, &lane) in chosen.iter().enumerate() {
                 assert_eq!(packed[k], ca[lane]);
                 assert_eq!(packed_ints[k], ca[lane].floor() as i32);
+            }
+            for (k, third) in L::load_triples(&self.a[..3 * width]).into_iter().enumerate() {
+                L::store(third, &mut packed);
+                assert!((0..width).all(|lane| packed[lane] == self.a[3 * lane + k]));
+            }
+            for (group, four) in ca.chunks(4).enumerate() {
+                L::store(L::least_of_four(a), &mut packed);
+                let least = four.iter().copied().fold(f32::INFINITY, f32::min);
+                assert!(packed[4 * group..][..four.len()].iter().all(|&x| x == least));
+                L::store(L::largest_of_four(a), &mut packed);
+                let largest = four.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+                assert!(packed[4 * group..][..four.len()].iter().all(|&x| x == largest));
             }
             if out.is_empty() {
                 out = results;
@@ -138,6 +149,7 @@ fn one_lane_is_plain_arithmetic() {
     assert_eq!(one(a + b), 4.75);
     assert_eq!(one(a / b), -2.9);
     assert_eq!(one(One::floor(b)), -3.0);
+    assert_eq!(one(One::times_power(b, One::splat_int(-3))), one(b) / 8.0);
     assert_eq!(one(One::mul_add(a, b, a)), -10.875);
     assert_eq!(one(One::select(One::lt(a, b), a, b)), -2.5);
     assert!(!One::any(One::lt(One::splat(f32::NAN), a)));

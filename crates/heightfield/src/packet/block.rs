@@ -5,10 +5,14 @@ use crate::lanes::Lanes;
 use crate::rays::load;
 use crate::{HeightField, RayArray};
 
-/// Rays in a block: their state stays in the second-level cache.
-pub const BLOCK: usize = 512;
+/// Rays taken into a block at a time.
+pub const BATCH: usize = 1024;
+/// Rays that may still look when others are taken in: their state stays in the second-level cache.
+pub const LEFT: usize = 256;
 /// Vectors may be written whole behind the last ray.
-pub const ROOM: usize = BLOCK + 16;
+const ROOM: usize = BATCH + LEFT + 16;
+/// Rays whose results are collected.
+pub const WINDOW: usize = 4096;
 
 /// Farthest a ray may go along an axis from lid to floor, in cells: with more, `f32` positions are off
 /// by more than the margins allow.
@@ -16,104 +20,114 @@ const FARTHEST: f64 = (1 << 20) as f64;
 
 /// Row of [`Block::single`] that holds the drops.
 pub const DROP: usize = 6;
+/// Row of [`Block::single`] that holds the levels to go on at.
+pub const LEVEL: usize = 7;
 /// Row of [`Block::double`] that holds the drops.
 pub const FINE_DROP: usize = 4;
 
-/// Rays in arrays. Ray `i` of the block is at a slot below `len` as long as it looks for its hit.
-pub struct Block {
-    /// Start x, y and direction x, y in tiles, inverse direction x, y in cells, drop.
-    pub single: [[f32; ROOM]; 7],
-    /// Start x, y and direction x, y in cells, drop.
-    pub double: [[f64; ROOM]; 5],
-    /// Which ray of the block.
-    pub ray: [i32; ROOM],
+/// Rays, or bundles of them, that step from node to node: what [`super::coarse::walk`] needs.
+pub struct Queue {
+    /// Start x, y and direction x, y in tiles, inverse direction x, y in cells, drop, level.
+    pub single: [[f32; ROOM]; 8],
     /// Nodes and cells visited.
     pub steps: [i32; ROOM],
-    /// Rays that still look.
+    /// How many there are.
     pub len: usize,
 }
 
-/// What is kept of every ray of a block.
+impl Queue {
+    /// An empty queue.
+    pub fn new() -> Self {
+        Self { single: [[0.0; ROOM]; 8], steps: [0; ROOM], len: 0 }
+    }
+}
+
+/// Rays in arrays. A ray is at a slot below `queue.len` as long as it looks for its hit.
+pub struct Block {
+    pub queue: Queue,
+    /// Start x, y and direction x, y in cells, drop.
+    pub double: [[f64; ROOM]; 5],
+    /// Which ray of the window.
+    pub ray: [i32; ROOM],
+}
+
+/// What is kept of every ray of a window.
 pub struct Results {
     /// Drop of the hit below the highest point; NaN for rays that need the search for one.
-    pub drop: [f64; ROOM],
+    pub drop: [f64; WINDOW + 16],
     /// Nodes and cells visited.
-    pub steps: [i32; ROOM],
+    pub steps: [i32; WINDOW + 16],
     /// Drop of the origin, and ray parameter for one unit of drop.
-    pub begin: [f64; ROOM],
+    pub begin: [f64; WINDOW + 16],
     /// See `begin`.
-    pub scale: [f64; ROOM],
+    pub scale: [f64; WINDOW + 16],
 }
 
 impl Results {
     /// Nothing yet.
     pub fn new() -> Self {
-        Self { drop: [0.0; ROOM], steps: [0; ROOM], begin: [0.0; ROOM], scale: [0.0; ROOM] }
+        let zeros = [0.0; WINDOW + 16];
+        Self { drop: zeros, steps: [0; WINDOW + 16], begin: zeros, scale: zeros }
     }
 }
 
 impl Block {
     /// An empty block.
     pub fn new() -> Self {
-        Self { single: [[0.0; ROOM]; 7], double: [[0.0; ROOM]; 5], ray: [0; ROOM], steps: [0; ROOM], len: 0 }
+        Self { queue: Queue::new(), double: [[0.0; ROOM]; 5], ray: [0; ROOM] }
     }
 
-    /// Takes in rays, at most [`BLOCK`]. `drops` says how far down each group of four is free.
+    /// Takes in rays, at most [`BATCH`], the first of which is ray `first` of the window.
     ///
-    /// Rays that do not go down, or not steeply enough, are left out: their result is NaN.
+    /// Rays that do not go down, or not steeply enough, are left out: their result stays as it is.
     #[inline(always)]
     pub fn fill<L: Lanes>(
         &mut self,
         field: &HeightField,
         origins: RayArray<'_>,
         directions: RayArray<'_>,
-        drops: &[f32],
+        first: usize,
         results: &mut Results,
     ) {
         let size = [L::splat_wide(field.width() as f64), L::splat_wide(field.height() as f64)];
-        let [nx, ny] = field.cells();
-        let cells = [L::splat_wide(nx as f64), L::splat_wide(ny as f64)];
+        let cells = field.cells().map(|n| L::splat_wide(n as f64));
+        let inverse = field.cells().map(|n| L::splat_wide(1.0 / n as f64));
         let shift = L::splat_wide(0.5 + field.first_texel() as f64);
         let highest = L::splat_wide(f64::from(field.pyramid().highest()));
         let zero = L::splat_wide(0.0);
         let slack = L::splat(crate::margin::SLACK);
-        self.len = 0;
+        let lanes: [i32; 16] = std::array::from_fn(|lane| lane as i32);
         for at in (0..origins.len()).step_by(L::WIDTH) {
-            let slot = self.len;
+            let slot = self.queue.len;
             let o = load::<L>(origins, at);
             let d = load::<L>(directions, at);
             let scale = L::splat_wide(-1.0) / d[2];
             let begin = highest - o[2];
-            L::store_wide(scale, &mut results.scale[at..]);
-            L::store_wide(begin, &mut results.begin[at..]);
-            L::store_wide(L::splat_wide(f64::NAN), &mut results.drop[at..]);
+            L::store_wide(scale, &mut results.scale[first + at..]);
+            L::store_wide(begin, &mut results.begin[first + at..]);
             let mut usable = L::first(origins.len() - at) & L::lt_wide(d[2], zero);
+            let single = &mut self.queue.single;
             for k in 0..2 {
                 let direction = d[k] * size[k] * scale;
                 let distance = L::max_wide(direction, zero - direction);
                 usable = usable & L::le_wide(distance, L::splat_wide(FARTHEST));
-                let start = o[k] * size[k] - shift - begin * direction;
-                let tiles = start / cells[k];
-                let tiles = if field.is_periodic() { tiles - L::floor_wide(tiles) } else { tiles };
-                L::store(L::narrow(tiles), &mut self.single[k][slot..]);
-                L::store(L::narrow(direction / cells[k]), &mut self.single[2 + k][slot..]);
-                L::store(Axis::<L>::inverse_of(L::narrow(direction)), &mut self.single[4 + k][slot..]);
-                L::store_wide(tiles * cells[k], &mut self.double[k][slot..]);
+                let mut start = o[k] * size[k] - shift - begin * direction;
+                if field.is_periodic() {
+                    start = start - L::floor_wide(start * inverse[k]) * cells[k];
+                }
+                L::store(L::narrow(start * inverse[k]), &mut single[k][slot..]);
+                L::store(L::narrow(direction * inverse[k]), &mut single[2 + k][slot..]);
+                L::store(Axis::<L>::inverse_of(L::narrow(direction)), &mut single[4 + k][slot..]);
+                L::store_wide(start, &mut self.double[k][slot..]);
                 L::store_wide(direction, &mut self.double[2 + k][slot..]);
             }
             // A ray starts at its origin or at the highest point, whichever is lower.
             let from = L::max_wide(begin, zero);
-            let mut free = [0.0; 16];
-            let mut ray = [0; 16];
-            for i in 0..L::WIDTH {
-                free[i] = drops[((at + i) / 4).min(drops.len() - 1)];
-                ray[i] = (at + i) as i32;
-            }
             let rounded_down = L::narrow(from) - (slack + slack * L::narrow(from));
-            L::store(L::max(L::load(&free), rounded_down), &mut self.single[DROP][slot..]);
+            L::store(rounded_down, &mut single[DROP][slot..]);
             L::store_wide(from, &mut self.double[FINE_DROP][slot..]);
-            L::store_int(L::load_int(&ray), &mut self.ray[slot..]);
-            L::store_int(L::splat_int(0), &mut self.steps[slot..]);
+            L::store_int(L::load_int(&lanes) + L::splat_int((first + at) as i32), &mut self.ray[slot..]);
+            L::store_int(L::splat_int(0), &mut self.queue.steps[slot..]);
             self.keep::<L>(slot, usable);
         }
     }
@@ -121,13 +135,13 @@ impl Block {
     /// Moves the chosen rays of the vector at `from` to the end of those kept so far.
     #[inline(always)]
     pub fn keep<L: Lanes>(&mut self, from: usize, chosen: L::M) {
-        let to = self.len;
+        let to = self.queue.len;
         let count = L::bits(chosen).count_ones() as usize;
-        self.len += count;
+        self.queue.len += count;
         if from == to && count == L::WIDTH {
             return;
         }
-        for row in &mut self.single {
+        for row in &mut self.queue.single {
             let x = L::load(&row[from..]);
             L::compress(chosen, x, &mut row[to..]);
         }
@@ -135,7 +149,7 @@ impl Block {
             let x = L::load_wide(&row[from..]);
             L::compress_wide(chosen, x, &mut row[to..]);
         }
-        for row in [&mut self.ray, &mut self.steps] {
+        for row in [&mut self.ray, &mut self.queue.steps] {
             let x = L::load_int(&row[from..]);
             L::compress_int(chosen, x, &mut row[to..]);
         }

@@ -1,6 +1,6 @@
 //! The fine walk: from cell to cell near the surface, and the closed-form root in `f64`.
 
-use super::block::{Block, DROP, FINE_DROP, Results};
+use super::block::{Block, DROP, FINE_DROP, LEVEL, Results};
 use super::grid::{BIG, Grid};
 use crate::HeightField;
 use crate::lanes::Lanes;
@@ -8,6 +8,9 @@ use crate::margin::SLACK;
 
 /// Most cells a ray is walked through before it goes back to coarse steps.
 const CELLS: usize = 4;
+
+/// Level at which rays go on that went through their cells.
+const AGAIN: f32 = 1.0;
 
 /// Two sides of a cell are crossed at the same time when they are this close, in cells: the walk is
 /// good to a tenth of it.
@@ -24,14 +27,15 @@ pub fn walk<L: Lanes>(block: &mut Block, field: &HeightField, results: &mut Resu
     let gx = Grid::<L>::new(nx, field.is_periodic());
     let gy = Grid::<L>::new(ny, field.is_periodic());
     let pyramid = field.pyramid();
-    let len = block.len;
-    block.len = 0;
+    let again = L::splat(AGAIN.min(field.margins().narrowest().top() as f32));
+    let len = block.queue.len;
+    block.queue.len = 0;
     for at in (0..len).step_by(L::WIDTH) {
         let active = L::first(len - at);
         let rays = Rays::<L>::load(block, at);
         let walk = rays.cells(active, pyramid.maxima(), pyramid.highest(), &gx, &gy, nx);
-        let steps = L::load_int(&block.steps[at..]) + walk.steps;
-        L::store_int(steps, &mut block.steps[at..]);
+        let steps = L::load_int(&block.queue.steps[at..]) + walk.steps;
+        L::store_int(steps, &mut block.queue.steps[at..]);
         let near = active & !walk.clear & !walk.doubtful;
         let mut advance = L::widen(walk.exit);
         let mut found = L::first(0);
@@ -57,7 +61,8 @@ pub fn walk<L: Lanes>(block: &mut Block, field: &HeightField, results: &mut Resu
             let drop = rays.drop + advance;
             // Rounded down, so that the coarse walk does not pass what the fine one has not seen.
             let rounded = L::narrow(drop * L::splat_wide(1.0 - f64::from(f32::EPSILON)));
-            L::store(rounded, &mut block.single[DROP][at..]);
+            L::store(rounded, &mut block.queue.single[DROP][at..]);
+            L::store(again, &mut block.queue.single[LEVEL][at..]);
             L::store_wide(drop, &mut block.double[FINE_DROP][at..]);
             block.keep::<L>(at, keep);
         }
@@ -92,7 +97,7 @@ struct Walk<L: Lanes> {
 impl<L: Lanes> Rays<L> {
     #[inline(always)]
     fn load(block: &Block, at: usize) -> Self {
-        let coarse = L::widen(L::load(&block.single[DROP][at..]));
+        let coarse = L::widen(L::load(&block.queue.single[DROP][at..]));
         let drop = L::max_wide(L::load_wide(&block.double[FINE_DROP][at..]), coarse);
         let direction = [L::load_wide(&block.double[2][at..]), L::load_wide(&block.double[3][at..])];
         let x = L::load_wide(&block.double[0][at..]) + drop * direction[0];
@@ -103,7 +108,7 @@ impl<L: Lanes> Rays<L> {
             local: [x - cell_x, y - cell_y],
             cell: [L::narrow(cell_x), L::narrow(cell_y)],
             direction,
-            inverse: [L::load(&block.single[4][at..]), L::load(&block.single[5][at..])],
+            inverse: [L::load(&block.queue.single[4][at..]), L::load(&block.queue.single[5][at..])],
         }
     }
 
@@ -120,33 +125,34 @@ impl<L: Lanes> Rays<L> {
     ) -> Walk<L> {
         let (zero, one) = (L::splat(0.0), L::splat(1.0));
         let below_one = L::splat(1.0 - f32::EPSILON / 2.0);
-        let local_x = L::min(L::narrow(self.local[0]), below_one);
-        let local_y = L::min(L::narrow(self.local[1]), below_one);
         let (up_x, up_y) = (L::lt(zero, self.inverse[0]), L::lt(zero, self.inverse[1]));
         // The side ahead, and the next cell.
         let (ahead_x, ahead_y) = (L::select(up_x, one, zero), L::select(up_y, one, zero));
         let (step_x, step_y) = (ahead_x + ahead_x - one, ahead_y + ahead_y - one);
+        let side_x = ahead_x - L::min(L::narrow(self.local[0]), below_one);
+        let side_y = ahead_y - L::min(L::narrow(self.local[1]), below_one);
         let least = L::min(L::abs(self.inverse[0]), L::abs(self.inverse[1]));
         let tie = L::splat(TIE) * least;
-        // What a ray at the start of the walk is below the highest point, and the rounding of it all.
-        let drop = L::narrow(self.drop) + L::splat(SLACK);
-        let mut cell = [zero; 2];
+        // How far a ray at the start of the walk is above the lowest point, less the rounding of it all.
+        let room = L::splat(highest) - (L::narrow(self.drop) + L::splat(SLACK));
+        let mut x = gx.number(self.cell[0]);
+        let mut y = gy.number(self.cell[1]);
+        let stride = L::splat_int(nx as i32);
         let mut walk = Walk {
             clear: active,
             doubtful: L::first(0),
-            cell,
+            cell: [zero; 2],
             corner: L::splat_int(0),
             exit: zero,
             steps: L::splat_int(0),
         };
+        let mut cell = [zero; 2];
         for _ in 0..CELLS {
-            let x = gx.number(self.cell[0] + cell[0]);
-            let y = gy.number(self.cell[1] + cell[1]);
-            let number = x + y * L::splat_int(nx as i32);
+            let number = x + y * stride;
             // SAFETY: the number of a cell.
             let maximum = unsafe { L::gather(maxima, number, walk.clear) };
-            let to_x = (cell[0] + ahead_x - local_x) * self.inverse[0];
-            let to_y = (cell[1] + ahead_y - local_y) * self.inverse[1];
+            let to_x = (cell[0] + side_x) * self.inverse[0];
+            let to_y = (cell[1] + side_y) * self.inverse[1];
             // No ray is longer than from the lid to the floor.
             let exit = L::min(L::max(L::min(to_x, to_y), walk.exit), L::splat(2.0));
             walk.steps = L::select_int(walk.clear, walk.steps + L::splat_int(1), walk.steps);
@@ -156,13 +162,16 @@ impl<L: Lanes> Rays<L> {
             walk.cell[1] = L::select(walk.clear, cell[1], walk.cell[1]);
             // A row of corners is longer by one than a row of cells.
             walk.corner = L::select_int(walk.clear, number + y, walk.corner);
-            walk.clear = walk.clear & L::lt(drop + exit, L::splat(highest) - maximum);
+            walk.clear = walk.clear & L::lt(maximum, room - exit);
             if !L::any(walk.clear) {
                 break;
             }
+            // Rays that have stopped go on as well, so that the next cell does not wait for the table.
             let by_x = L::le(to_x, to_y);
             cell[0] = L::select(by_x, cell[0] + step_x, cell[0]);
             cell[1] = L::select(by_x, cell[1], cell[1] + step_y);
+            x = L::select_int(by_x, gx.next(self.cell[0] + cell[0], x, up_x), x);
+            y = L::select_int(by_x, y, gy.next(self.cell[1] + cell[1], y, up_y));
         }
         walk
     }

@@ -1,6 +1,6 @@
-//! The coarse walk of a whole block: each ray down to where it may be near the surface.
+//! The coarse walk: each ray, or bundle, down to where it may be near the surface.
 
-use super::block::{Block, DROP};
+use super::block::{DROP, Queue};
 use super::grid::{Axis, Coarse, Grid};
 use crate::lanes::Lanes;
 use crate::margin::MarginPyramid;
@@ -17,26 +17,25 @@ struct Stream<L: Lanes> {
     used: u32,
 }
 
-/// Walks every ray of the block over the narrowest pyramid, beginning at a level.
+/// Walks all of a queue over a pyramid.
 ///
 /// Rays take unequal numbers of steps, so lanes that have stopped are handed new rays once they are
 /// many enough.
 #[inline(always)]
-pub fn walk<L: Lanes>(block: &mut Block, bound: &MarginPyramid, gx: &Grid<L>, gy: &Grid<L>, level: usize) {
-    let level = L::splat_int(level.clamp(bound.margin(), bound.top()) as i32);
-    let few = L::WIDTH as u32 / 4;
+pub fn walk<L: Lanes>(queue: &mut Queue, bound: &MarginPyramid, gx: &Grid<L>, gy: &Grid<L>) {
+    let few = L::WIDTH as u32 * 3 / 8;
     let zero = L::splat(0.0);
     let still = Axis { start: zero, direction: zero, inverse: zero };
-    let idle = Coarse::<L>::new(still, still, zero, level, L::first(0));
+    let idle = Coarse::<L>::new(still, still, zero, L::splat_int(0), L::first(0));
     let mut streams = [Stream::<L> { rays: idle, slots: [0; 16], used: 0 }; STREAMS];
     let mut next = 0;
     loop {
         let mut alive = false;
         for stream in &mut streams {
             let running = L::bits(stream.rays.running);
-            if running == 0 || (running.count_ones() <= few && next < block.len) {
-                write_back(block, stream, running);
-                next += refill(block, stream, next, level);
+            if running == 0 || (running.count_ones() <= few && next < queue.len) {
+                write_back(queue, stream, running);
+                next += refill(queue, stream, next);
                 if !L::any(stream.rays.running) {
                     continue;
                 }
@@ -52,7 +51,7 @@ pub fn walk<L: Lanes>(block: &mut Block, bound: &MarginPyramid, gx: &Grid<L>, gy
 
 /// Stores the drops of lanes that have stopped.
 #[inline(always)]
-fn write_back<L: Lanes>(block: &mut Block, stream: &mut Stream<L>, running: u32) {
+fn write_back<L: Lanes>(queue: &mut Queue, stream: &mut Stream<L>, running: u32) {
     let mut done = stream.used & !running;
     if done != 0 {
         let (mut drop, mut steps) = ([0.0; 16], [0; 16]);
@@ -61,8 +60,8 @@ fn write_back<L: Lanes>(block: &mut Block, stream: &mut Stream<L>, running: u32)
         while done != 0 {
             let lane = done.trailing_zeros() as usize & 15;
             let slot = usize::from(stream.slots[lane]);
-            block.single[DROP][slot] = drop[lane];
-            block.steps[slot] += steps[lane];
+            queue.single[DROP][slot] = drop[lane];
+            queue.steps[slot] += steps[lane];
             done &= done - 1;
         }
     }
@@ -71,15 +70,15 @@ fn write_back<L: Lanes>(block: &mut Block, stream: &mut Stream<L>, running: u32)
 
 /// Gives rays from slot `next` on to the lanes that do not run; returns how many.
 #[inline(always)]
-fn refill<L: Lanes>(block: &Block, stream: &mut Stream<L>, next: usize, level: L::I) -> usize {
+fn refill<L: Lanes>(queue: &Queue, stream: &mut Stream<L>, next: usize) -> usize {
     let running = stream.rays.running;
     let vacant = L::WIDTH - L::bits(running).count_ones() as usize;
-    let more = vacant.min(block.len - next);
+    let more = vacant.min(queue.len - next);
     if more == 0 {
         return 0;
     }
     let chosen = L::first(L::WIDTH) & !running;
-    stream.rays.refill(chosen, std::array::from_fn(|k| &block.single[k][next..]), level);
+    stream.rays.refill(chosen, std::array::from_fn(|k| &queue.single[k][next..]));
     let mut vacant = L::bits(chosen);
     let mut fresh = 0_u32;
     for slot in next..next + more {

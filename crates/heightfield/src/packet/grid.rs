@@ -17,7 +17,6 @@ pub struct Grid<L: Lanes> {
     inverse: L::F,
     half_inverse: L::F,
     last: L::I,
-    count: L::I,
 }
 
 impl<L: Lanes> Grid<L> {
@@ -31,49 +30,59 @@ impl<L: Lanes> Grid<L> {
             inverse: L::splat(1.0 / n),
             half_inverse: L::splat(0.5 / n),
             last: L::splat_int(cells as i32 - 1),
-            count: L::splat_int(cells as i32),
         }
     }
 
-    /// Cells to tiles.
+    /// How many cells there are.
     #[inline(always)]
-    pub fn tiles(&self, cells: L::F) -> L::F {
-        cells * self.inverse
+    pub fn cells(&self) -> L::F {
+        self.cells
     }
 
-    /// Where a position in tiles lies, in cells; on the tile at the origin when the grid repeats.
+    /// The node of a position in tiles when the grid has `nodes` of them, of which the last may be less
+    /// than whole, and where its two sides are from there, in nodes: the one at `ahead` nodes (0 or 1)
+    /// and how far it is. Finite positions give a node of the grid.
     #[inline(always)]
-    fn place(&self, tiles: L::F) -> L::F {
-        if self.periodic { (tiles - L::floor(tiles)) * self.cells } else { tiles * self.cells }
-    }
-
-    /// The cell of a place. Never outside the grid, whatever the input.
-    #[inline(always)]
-    fn cell_at(&self, place: L::F) -> L::I {
+    fn node(&self, tiles: L::F, nodes: L::F, ahead: L::F) -> (L::F, L::F, L::F) {
+        let below_one = L::splat(1.0 - f32::EPSILON / 2.0);
         if self.periodic {
-            L::min_unsigned(L::to_int(place), self.last)
+            let place = L::min(tiles - L::floor(tiles), below_one) * nodes;
+            let node = L::floor(place);
+            let side = L::min(node + ahead, nodes);
+            (node, side, side - place)
         } else {
-            let (first, last) = (L::splat(0.0), self.cells - L::splat(1.0));
-            L::min_unsigned(L::to_int(L::max(L::min(place, last), first)), self.last)
+            let zero = L::splat(0.0);
+            let node = L::floor(L::max(L::min(tiles, below_one), zero) * nodes);
+            let side = node + ahead;
+            let open = L::le(side, zero) & L::le(ahead, zero) | L::le(nodes, side);
+            let far = L::splat(BIG) * (ahead + ahead - L::splat(1.0));
+            (node, side, L::select(open, far, side - tiles * nodes))
         }
+    }
+
+    /// The number of `cell`, whose neighbour behind, on the way up or down, has number `last`.
+    #[inline(always)]
+    pub fn next(&self, cell: L::F, last: L::I, up: L::M) -> L::I {
+        if !self.periodic {
+            return self.number(cell);
+        }
+        let (zero, one) = (L::splat_int(0), L::splat_int(1));
+        let end = L::select_int(up, self.last, zero);
+        let step = L::select_int(up, one, zero - one);
+        L::select_int(L::eq_int(last, end), self.last - end, last + step)
     }
 
     /// The number of a cell on any tile, a whole number. Never outside the grid, whatever the input.
     #[inline(always)]
     pub fn number(&self, cell: L::F) -> L::I {
-        if self.periodic {
+        let cell = if self.periodic {
             let tile = L::floor(L::mul_add(cell, self.inverse, self.half_inverse));
-            L::min_unsigned(L::to_int(cell - tile * self.cells), self.last)
+            cell - tile * self.cells
         } else {
-            self.cell_at(cell)
-        }
-    }
-
-    /// Whether a side of a node is where the endless cells begin.
-    #[inline(always)]
-    fn is_open(&self, side: L::F, up: L::M) -> L::M {
-        let border = L::select(up, self.cells, L::splat(0.0));
-        L::le(L::abs(side - border), L::splat(0.0))
+            let (first, last) = (L::splat(0.0), self.cells - L::splat(1.0));
+            L::max(L::min(cell, last), first)
+        };
+        L::min_unsigned(L::to_int(cell), self.last)
     }
 }
 
@@ -111,8 +120,8 @@ impl<L: Lanes> Axis<L> {
 pub struct Coarse<L: Lanes> {
     x: Axis<L>,
     y: Axis<L>,
-    up_x: L::M,
-    up_y: L::M,
+    /// 1 along an axis on which they go up, 0 elsewhere.
+    ahead: [L::F; 2],
     /// An eighth of a cell, as drop: so far a step goes into the next node.
     overshoot: L::F,
     /// Where they are. Down to here nothing is in the way.
@@ -128,57 +137,60 @@ impl<L: Lanes> Coarse<L> {
     /// Rays at a drop, to begin at a level.
     #[inline(always)]
     pub fn new(x: Axis<L>, y: Axis<L>, drop: L::F, level: L::I, running: L::M) -> Self {
-        let zero = L::splat(0.0);
+        let (zero, one) = (L::splat(0.0), L::splat(1.0));
         let overshoot = L::splat(0.125) * L::min(L::abs(x.inverse), L::abs(y.inverse));
-        let (up_x, up_y) = (L::lt(zero, x.inverse), L::lt(zero, y.inverse));
-        Self { x, y, up_x, up_y, overshoot, drop, level, steps: L::splat_int(0), running }
+        let ahead_x = L::select(L::lt(zero, x.inverse), one, zero);
+        let ahead_y = L::select(L::lt(zero, y.inverse), one, zero);
+        Self { x, y, ahead: [ahead_x, ahead_y], overshoot, drop, level, steps: L::splat_int(0), running }
     }
 
     /// One step of every running lane: across its node when that is free, else down to the free drop
     /// and to a finer node. Lanes stop that are not free at the finest level.
     #[inline(always)]
     pub fn step(&mut self, bound: &MarginPyramid, gx: &Grid<L>, gy: &Grid<L>) {
-        let one = L::splat_int(1);
         let level = self.level;
-        let x = gx.place(L::mul_add(self.drop, self.x.direction, self.x.start));
-        let y = gy.place(L::mul_add(self.drop, self.y.direction, self.y.start));
-        let node_x = L::shift_right(gx.cell_at(x), level);
-        let node_y = L::shift_right(gy.cell_at(y), level);
-        let at = L::lookup(bound.offsets(), level) + node_x + node_y * L::lookup(bound.strides(), level);
-        // SAFETY: a node of its level, since its cell is inside the grid.
+        let finer = L::splat_int(0) - level;
+        let (node_x, side_x, to_x) = gx.node(
+            L::mul_add(self.drop, self.x.direction, self.x.start),
+            L::times_power(gx.cells, finer),
+            self.ahead[0],
+        );
+        let (node_y, side_y, to_y) = gy.node(
+            L::mul_add(self.drop, self.y.direction, self.y.start),
+            L::times_power(gy.cells, finer),
+            self.ahead[1],
+        );
+        let at = L::to_int(node_x)
+            + L::to_int(node_y) * L::lookup(bound.strides(), level)
+            + L::lookup(bound.offsets(), level);
+        let at = L::min_unsigned(at, L::splat_int(bound.last()));
+        // SAFETY: at most the last of the table.
         let free = unsafe { L::gather(bound.drops(), at, self.running) };
-        let next_x = L::select_int(self.up_x, node_x + one, node_x);
-        let next_y = L::select_int(self.up_y, node_y + one, node_y);
-        let side_x = L::to_float(L::min_int(L::shift_left(next_x, level), gx.count));
-        let side_y = L::to_float(L::min_int(L::shift_left(next_y, level), gy.count));
-        let mut to_x = (side_x - x) * self.x.inverse;
-        let mut to_y = (side_y - y) * self.y.inverse;
-        if !gx.periodic {
-            to_x = L::select(gx.is_open(side_x, self.up_x), L::splat(BIG), to_x);
-            to_y = L::select(gy.is_open(side_y, self.up_y), L::splat(BIG), to_y);
-        }
-        let exit = self.drop + (L::min(to_x, to_y) + self.overshoot);
+        let (to_x, to_y) = (to_x * self.x.inverse, to_y * self.y.inverse);
+        let cells = L::times_power(L::splat(1.0), level);
+        let exit = L::mul_add(L::min(to_x, to_y), cells, self.drop + self.overshoot);
         let clear = L::le(exit, free);
         self.drop = L::select(self.running, L::min(L::max(self.drop, free), exit), self.drop);
-        self.steps = L::select_int(self.running, self.steps + one, self.steps);
+        let step = L::splat_int(1);
+        self.steps = L::select_int(self.running, self.steps + step, self.steps);
         // The side a ray leaves by, counted in nodes, is even where it is a side of the parent as well.
-        let side = L::select_int(L::le(to_x, to_y), next_x, next_y);
-        let climb = clear & !L::odd(side);
-        let down = L::select_int(clear, level, level - one);
-        let failed = L::lt_int(down, L::splat_int(bound.margin() as i32));
+        let side = L::select(L::le(to_x, to_y), side_x, side_y);
+        let climb = clear & !L::odd(L::to_int(side));
+        let down = L::select_int(clear, level, level - step);
+        let failed = L::lt_int(down, L::splat_int(bound.finest() as i32));
         let highest = L::splat_int(bound.top() as i32);
-        self.level = L::select_int(climb, L::min_int(level + one, highest), down);
+        self.level = L::select_int(climb, L::min_int(level + step, highest), down);
         self.running = self.running & !failed;
     }
 
     /// Replaces the chosen lanes by the first numbers of the arrays, in order.
     #[inline(always)]
-    pub fn refill(&mut self, chosen: L::M, from: [&[f32]; 7], level: L::I) {
+    pub fn refill(&mut self, chosen: L::M, from: [&[f32]; 8]) {
         let x = self.x.refill(chosen, from[0], from[2], from[4]);
         let y = self.y.refill(chosen, from[1], from[3], from[5]);
         let drop = L::expand(chosen, from[6], self.drop);
         let steps = L::select_int(chosen, L::splat_int(0), self.steps);
-        let level = L::select_int(chosen, level, self.level);
+        let level = L::to_int(L::expand(chosen, from[7], L::to_float(self.level)));
         *self = Self { steps, ..Self::new(x, y, drop, level, self.running) };
     }
 }

@@ -17,17 +17,16 @@ mod cells;
 mod coarse;
 mod grid;
 
+use std::ops::Range;
+
 use crate::HeightField;
 use crate::chunk::{Chunk, Outcome};
 use crate::lanes::{Kernel, Lanes};
-use block::{BLOCK, Block, Results};
+use block::{BATCH, Block, LEFT, Queue, Results, WINDOW};
 use grid::Grid;
 
-/// Rounds of coarse and fine walks after which the rays left take the search for one ray.
+/// Rounds of coarse and fine walks without new rays, after which the rays left take the search for one.
 const ROUNDS: usize = 1 << 14;
-
-/// Level at which rays begin that have come down in a bundle, and others.
-const BEGIN: [usize; 2] = [2, 5];
 
 /// Cells above which node numbers would not fit.
 const MOST_CELLS: usize = 1 << 28;
@@ -53,13 +52,14 @@ impl Kernel for Exact<'_, '_> {
             return;
         }
         let mut block = Block::new();
+        let mut bundles = Queue::new();
         let mut results = Results::new();
-        for from in (0..n).step_by(BLOCK) {
+        for from in (0..n).step_by(WINDOW) {
+            let to = (from + WINDOW).min(n);
+            descend::<L>(field, chunk, from..to, &mut block, &mut bundles, &mut results);
             if chunk.cancelled() {
                 return;
             }
-            let to = (from + BLOCK).min(n);
-            descend::<L>(field, chunk, from..to, &mut block, &mut results);
             write::<L>(field, chunk, from, to - from, &results);
             chunk.march_singly(field, from..to, |i| results.drop[i - from].is_nan());
         }
@@ -81,30 +81,38 @@ fn write<L: Lanes>(field: &HeightField, chunk: &mut Chunk<'_>, from: usize, n: u
     }
 }
 
-/// Finds the hits of the rays of a block.
+/// Finds the hits of the rays of a window. New rays are taken in while others still look, for a few that
+/// are left over would leave most lanes idle.
 #[inline(always)]
 fn descend<L: Lanes>(
     field: &HeightField,
     chunk: &Chunk<'_>,
-    range: std::ops::Range<usize>,
+    range: Range<usize>,
     block: &mut Block,
+    bundles: &mut Queue,
     results: &mut Results,
 ) {
     let margins = field.margins();
-    let origins = chunk.origins.slice(range.start, range.end);
-    let directions = chunk.directions.slice(range.start, range.end);
     let gx = Grid::<L>::new(field.cells()[0], field.is_periodic());
     let gy = Grid::<L>::new(field.cells()[1], field.is_periodic());
-    let free = beams::free_drops::<L>(field, margins, origins, directions);
-    block.fill::<L>(field, origins, directions, &free, results);
-    let mut begin = BEGIN[usize::from(free[0] == 0.0)];
-    for _ in 0..ROUNDS {
-        if block.len == 0 || chunk.cancelled() {
+    let mut next = range.start;
+    let mut rounds = 0;
+    block.queue.len = 0;
+    results.drop.fill(f64::NAN);
+    while rounds < ROUNDS && !chunk.cancelled() {
+        if next < range.end && block.queue.len <= LEFT {
+            let to = (next + BATCH).min(range.end);
+            let (origins, directions) = (chunk.origins.slice(next, to), chunk.directions.slice(next, to));
+            let old = block.queue.len;
+            block.fill::<L>(field, origins, directions, next - range.start, results);
+            beams::descend::<L>(&mut block.queue, old, bundles, margins, &gx, &gy);
+            (next, rounds) = (to, 0);
+        } else if block.queue.len == 0 {
             return;
         }
-        coarse::walk::<L>(block, margins.narrowest(), &gx, &gy, begin);
+        coarse::walk::<L>(&mut block.queue, margins.narrowest(), &gx, &gy);
         cells::walk::<L>(block, field, results);
-        begin = 1;
+        rounds += 1;
     }
 }
 
