@@ -104,46 +104,6 @@ fn cones_are_empty_over_every_point_around_the_texel() {
     }
 }
 
-/// The steepest rise found by a grid of samples from the surface around a texel.
-fn sampled_rise(field: &HeightField, texel: [usize; 2]) -> f64 {
-    let (w, h) = (field.width() as f64, field.height() as f64);
-    let steps =
-        |n: i32, from: f64, to: f64| (0..=n).map(move |k| from + (to - from) * f64::from(k) / f64::from(n));
-    let mut steepest = 1.0_f64;
-    for b in steps(8, -1.0, 1.0) {
-        for a in steps(8, -1.0, 1.0) {
-            let x = [(texel[0] as f64 + 0.5 + a) / w, (texel[1] as f64 + 0.5 + b) / h];
-            let low = height(field, x);
-            for d in steps(8 * h as i32, -0.5, 0.5) {
-                for c in steps(8 * w as i32, -0.5, 0.5) {
-                    let away = c.hypot(d);
-                    if away > 0.0 {
-                        steepest = steepest.max((height(field, [x[0] + c, x[1] + d]) - low) / away);
-                    }
-                }
-            }
-        }
-    }
-    steepest
-}
-
-#[test]
-fn cones_are_not_narrower_than_they_must_be() {
-    // Share of the true ratio that may be given away; measured: 0.05 and 0.49.
-    for (field, share) in [(waves(20, 16, Wrap::Repeat), 0.12), (noise(14, 13, Wrap::Repeat, 3), 0.55)] {
-        let map = cones(&field, ConeMode::Conservative);
-        let mut worst = 0.0_f64;
-        for texel in [[3, 4], [9, 2], [0, 7], [11, 11]] {
-            let widest = 1.0 / sampled_rise(&field, texel);
-            let found = f64::from(map[texel[1] * field.width() + texel[0]]);
-            assert!(found <= widest * (1.0 + 1e-9), "{found} against {widest}");
-            worst = worst.max(1.0 - found / widest);
-        }
-        println!("given away: {worst}");
-        assert!(worst < share, "{worst}");
-    }
-}
-
 #[test]
 fn textbook_cones_cut_the_surface_and_the_check_sees_it() {
     let field = noise(17, 12, Wrap::Repeat, 7);
@@ -200,11 +160,7 @@ fn relaxed_cones_are_pierced_at_most_once() {
                 let published = of(&field, &published);
                 let empty = cones(&field, ConeMode::Conservative);
                 for (at, &ratio) in map.iter().enumerate() {
-                    // Bounds are found in another order, and differ a little.
-                    assert!(
-                        ratio >= 0.9 * empty[at] && ratio <= 1.0,
-                        "{name} {w}x{h} {wrap:?} {at}: narrower"
-                    );
+                    assert!(ratio >= empty[at] && ratio <= 1.0, "{name} {w}x{h} {wrap:?} {at}: narrower");
                     for _ in 0..6 {
                         let x = [
                             ((at % w) as f64 + 0.5 + random.range(-1.0, 1.0)) / w as f64,
@@ -230,48 +186,61 @@ fn relaxed_cones_are_wider_on_smooth_slopes() {
     assert!(wider > 400, "{wider} of 4096 are wider by a fifth");
 }
 
-/// The published construction, texel by texel.
+/// The published construction for one texel: from over it down through each other texel to the floor, in 128
+/// equal parts behind that; the ratio to the first that lies more than `margin` above the surface.
+fn published(field: &HeightField, [i, j]: [i64; 2], margin: f64) -> f64 {
+    let (w, h) = (field.width() as i64, field.height() as i64);
+    let low = f64::from(field.texel(i, j));
+    let reach = |at: i64, n: i64| {
+        if field.wrap() == Wrap::Clamp { 0..=n - 1 } else { at - 2 * n..=at + 2 * n }
+    };
+    let mut best = 1.0_f64;
+    for y in reach(j, h) {
+        for x in reach(i, w) {
+            let top = f64::from(field.texel(x, y));
+            let way = [(x - i) as f64 / w as f64, (y - j) as f64 / h as f64];
+            let out = way[0].hypot(way[1]);
+            if out == 0.0 || top <= low {
+                continue;
+            }
+            let place = |k: i32| {
+                let z = top - top * f64::from(k) / 128.0;
+                let reach = if top < 1.0 { (1.0 - z) / (1.0 - top) } else { 1.0 };
+                (z, reach)
+            };
+            let uv = |reach: f64| {
+                [(i as f64 + 0.5) / w as f64 + reach * way[0], (j as f64 + 0.5) / h as f64 + reach * way[1]]
+            };
+            let exit = (1..=128).map(place).find(|&(z, reach)| height(field, uv(reach)) < z - margin);
+            let exit = if top >= 1.0 { Some((top, 1.0)) } else { exit };
+            if let Some((z, reach)) = exit
+                && z > low
+            {
+                best = best.min(out * reach / (z - low));
+            }
+        }
+    }
+    best
+}
+
 #[test]
 fn relaxed_texel_mode_is_the_textbook_loop() {
-    // On the others rays run along the surface, and go either way by rounding.
-    let clear = |(name, _): &(&str, HeightField)| ["noise", "waves", "peak"].contains(name);
-    for (name, field) in maps(13, 9, Wrap::Repeat).into_iter().filter(clear) {
-        let (w, h) = (13_i64, 9_i64);
-        let found = relaxed(&field, ConeMode::Texel);
-        for (at, &found) in found.iter().enumerate() {
-            let (i, j) = (at as i64 % w, at as i64 / w);
-            let low = f64::from(field.texel(i, j));
-            let mut best = 1.0_f64;
-            for y in j - 2 * h..=j + 2 * h {
-                for x in i - 2 * w..=i + 2 * w {
-                    let top = f64::from(field.texel(x, y));
-                    let way = [(x - i) as f64 / w as f64, (y - j) as f64 / h as f64];
-                    let out = way[0].hypot(way[1]);
-                    if out == 0.0 || top <= low {
-                        continue;
-                    }
-                    // From over the texel down through the other to the floor, in 128 equal parts behind it.
-                    let place = |k: i32| {
-                        let z = top - top * f64::from(k) / 128.0;
-                        let reach = if top < 1.0 { (1.0 - z) / (1.0 - top) } else { 1.0 };
-                        (z, reach)
-                    };
-                    let uv = |reach: f64| {
-                        [
-                            (i as f64 + 0.5) / w as f64 + reach * way[0],
-                            (j as f64 + 0.5) / h as f64 + reach * way[1],
-                        ]
-                    };
-                    let exit = (1..=128).map(place).find(|&(z, reach)| height(&field, uv(reach)) < z);
-                    let exit = if top >= 1.0 { Some((top, 1.0)) } else { exit };
-                    if let Some((z, reach)) = exit
-                        && z > low
-                    {
-                        best = best.min(out * reach / (z - low));
-                    }
-                }
+    for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
+        for (name, field) in maps(13, 9, wrap) {
+            let found = relaxed(&field, ConeMode::Texel);
+            let mut either = 0;
+            for (at, &found) in found.iter().enumerate() {
+                let texel = [at as i64 % 13, at as i64 / 13];
+                // Rays along the surface are in or out by rounding: both are the textbook's.
+                let (narrow, wide) = (published(&field, texel, -1e-9), published(&field, texel, 1e-9));
+                let found = f64::from(found);
+                either += usize::from(wide - narrow > 1e-6);
+                assert!(
+                    found >= narrow - 1e-6 && found <= wide + 1e-6,
+                    "{name} {wrap:?} {at}: {found} against {narrow} to {wide}"
+                );
             }
-            assert!((f64::from(found) - best).abs() <= 1e-6, "{name} {at}: {found} against {best}");
+            println!("{name} {wrap:?}: {either} of {} texels by rounding", found.len());
         }
     }
 }
@@ -309,32 +278,4 @@ fn bakes_can_be_stopped_and_count_up() {
     cone_map(&field, ConeMode::Conservative, Progress::new(&mut watch)).unwrap();
     assert!(seen.windows(2).all(|pair| pair[0].0 <= pair[1].0));
     assert!(seen.last().is_some_and(|(done, total)| done == total));
-}
-
-#[test]
-#[ignore = "a double loop over 65536 texels"]
-fn a_map_of_256_texels_squared_is_the_double_loop() {
-    use rayon::prelude::*;
-    let n = 256_i64;
-    for field in [noise(256, 256, Wrap::Repeat, 9), waves(256, 256, Wrap::Repeat)] {
-        let texels = field.texels();
-        let found = cones(&field, ConeMode::Texel);
-        let worst = (0..(n * n) as usize)
-            .into_par_iter()
-            .map(|at| {
-                let (i, j) = (at as i64 % n, at as i64 / n);
-                let mut best = 1.0_f64;
-                for (k, &texel) in texels.iter().enumerate() {
-                    let rise = f64::from(texel) - f64::from(texels[at]);
-                    let away = |a: i64, b: i64| ((a - b + n / 2).rem_euclid(n) - n / 2) as f64 / n as f64;
-                    if rise > 0.0 {
-                        best = best.min(away(k as i64 % n, i).hypot(away(k as i64 / n, j)) / rise);
-                    }
-                }
-                (best - f64::from(found[at])).abs()
-            })
-            .reduce(|| 0.0, f64::max);
-        println!("largest difference: {worst}");
-        assert!(worst <= 1e-6, "{worst}");
-    }
 }

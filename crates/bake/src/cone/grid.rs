@@ -32,6 +32,41 @@ pub(super) struct Tile {
     pub gradient: [[f32; 2]; 2],
 }
 
+/// A tile or square of a level, with the first and last of its sites on the map.
+pub(super) struct Node<'a> {
+    pub tile: &'a Tile,
+    pub first: [i64; 2],
+    pub last: [i64; 2],
+}
+
+/// What is known of the points of a tile, lengths in UV units from some site.
+#[derive(Clone, Copy)]
+pub(super) struct Bounds {
+    pub centre: [f32; 2],
+    pub half: [f32; 2],
+    pub slope: [f32; 2],
+    pub level: f32,
+    pub max: f32,
+}
+
+impl Bounds {
+    /// Of a tile of sites `first` to `last`, seen from site `origin`.
+    #[inline(always)]
+    pub fn new(grid: &Grid<'_>, tile: &Tile, first: [i64; 2], last: [i64; 2], origin: [i64; 2]) -> Self {
+        let side = |axis: usize, sign: f32| {
+            let (low, high) = (first[axis] - origin[axis], last[axis] - origin[axis]);
+            0.5 * (high as f32 + grid.extent + sign * low as f32) * grid.step[axis]
+        };
+        Self {
+            centre: [side(0, 1.0), side(1, 1.0)],
+            half: [side(0, -1.0), side(1, -1.0)],
+            slope: tile.slope,
+            level: tile.level,
+            max: tile.max,
+        }
+    }
+}
+
 /// Tiles, or squares of two by two of the level below.
 struct Level {
     nodes: [usize; 2],
@@ -202,7 +237,46 @@ impl<'a> Grid<'a> {
         tile
     }
 
+    /// A node of a level.
+    #[inline(always)]
+    pub fn node(&self, level: usize, node: [usize; 2]) -> Node<'_> {
+        let [first, last] = self.sites_of(level, node);
+        Node { tile: self.levels[level].tile(node), first, last }
+    }
+
+    /// The whole map and, if it is periodic, its images around it.
+    #[inline(always)]
+    pub fn roots(&self, stack: &mut Vec<(usize, [usize; 2], [i64; 2])>) {
+        let images = if self.periodic { -1..=1 } else { 0..=0 };
+        for y in images.clone() {
+            for x in images.clone() {
+                let origin = [x * self.sites[0] as i64, y * self.sites[1] as i64];
+                stack.push((self.levels.len() - 1, [0, 0], origin));
+            }
+        }
+    }
+
+    /// The parts of a node.
+    #[inline(always)]
+    pub fn children(
+        &self,
+        level: usize,
+        node: [usize; 2],
+        origin: [i64; 2],
+        stack: &mut Vec<(usize, [usize; 2], [i64; 2])>,
+    ) {
+        let nodes = self.levels[level - 1].nodes;
+        for b in [2 * node[1], 2 * node[1] + 1] {
+            for a in [2 * node[0], 2 * node[0] + 1] {
+                if a < nodes[0] && b < nodes[1] {
+                    stack.push((level - 1, [a, b], origin));
+                }
+            }
+        }
+    }
+
     /// First and last site of a node of a level, on the map.
+    #[inline(always)]
     fn sites_of(&self, level: usize, node: [usize; 2]) -> [[i64; 2]; 2] {
         let first = node.map(|n| ((n << level) * TILE) as i64);
         let last = [0, 1].map(|axis| ((((node[axis] + 1) << level) * TILE).min(self.sites[axis])) as i64 - 1);
@@ -242,13 +316,8 @@ impl<'a> Grid<'a> {
     ) {
         let top = self.levels.len() - 1;
         let group = GROUP.min(top);
-        let images = if self.periodic { -1..=1 } else { 0..=0 };
         stack.clear();
-        for y in images.clone() {
-            for x in images.clone() {
-                stack.push((top, [0, 0], [x * self.sites[0] as i64, y * self.sites[1] as i64]));
-            }
-        }
+        self.roots(stack);
         while let Some((at, node, origin)) = stack.pop() {
             let tile = self.levels[at].tile(node);
             let [first, last] =
@@ -272,14 +341,7 @@ impl<'a> Grid<'a> {
                 visit(tile, first, last);
                 continue;
             }
-            let below = &self.levels[at - 1];
-            for b in [2 * node[1], 2 * node[1] + 1] {
-                for a in [2 * node[0], 2 * node[0] + 1] {
-                    if a < below.nodes[0] && b < below.nodes[1] {
-                        stack.push((at - 1, [a, b], origin));
-                    }
-                }
-            }
+            self.children(at, node, origin, stack);
         }
     }
 }

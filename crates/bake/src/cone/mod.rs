@@ -12,11 +12,14 @@
 //! mean of the ratios of the four texels around a point, such as bilinear interpolation, is safe there, and
 //! so is the widest of the four.
 //!
-//! Why it holds: the ratio of a texel is the least of the four cells around it, and that of a cell is `1 / s`
-//! with `s` an upper bound of `(h(y) - h(x)) / |y - x|` over all `x` in the cell and all `y` of the surface -
-//! `near` has the bound and its proof for `y` next to the cell, `pair` for all others. For
-//! relaxed cones only those `y` count at which the surface falls along the way from `x`: a ray that left the axis above
-//! the surface and is below it can come out again only at such a point, and the cone holds none.
+//! Why it holds: the ratio of an empty cone is `1 / s`, rounded down, with `s` the least upper bound of
+//! `(h(y) - h(x)) / |y - x|` over all these `x` and all `y` of the surface; `exact` says how it is found. No wider
+//! ratio is safe, and rounding costs less than 1e-6.
+//!
+//! For relaxed cones only those `y` count at which the surface falls along the way from `x`: a ray that left the axis
+//! above the surface and is below it can come out again only at such a point, and the cone holds none. Their slopes are
+//! bounds, not exact: `near` has the one for `y` next to the cell of `x`, `pair` that for all others. Where the
+//! empty cone is as wide it takes their place, as it is pierced by no ray at all.
 //!
 //! [`ConeMode::Texel`]: the definitions as published. The plain cone of a texel's centre holds no other
 //! texel's centre (Dummer 2006); the relaxed one comes from rays through other texels, sampled at equal steps
@@ -25,6 +28,7 @@
 //! Sources: Jonathan Dummer, Cone Step Mapping: An Iterative Ray-Heightfield Intersection Algorithm, 2006;
 //! Robert Ban, Gabor Valasek, Csaba Balint and Viktor Vad, Robust Cone Step Mapping, EGSR 2024.
 
+mod exact;
 mod grid;
 mod near;
 mod pair;
@@ -38,7 +42,7 @@ use crate::encode::Range;
 use crate::maps::{self, Channel, Form, Kind, Layer, Map, MapInfo, MapOption, Options, Plan};
 use crate::{BakeError, Progress};
 use grid::{Grid, Sites};
-use rules::{Empty, EmptyTexel, Falling, FallingTexel};
+use rules::{EmptyTexel, Falling, FallingTexel};
 use search::{Rule, steepest_rises};
 
 /// What the ratios of a cone map promise.
@@ -51,8 +55,8 @@ pub enum ConeMode {
     Texel,
 }
 
-/// Bytes a texel that a bake needs besides its result: slopes, tiles and the pyramid over them.
-const WORKING_BYTES: u128 = 12;
+/// Bytes a cell that a bake by rules needs besides its result: slopes, tiles and the pyramid over them.
+const RULES_BYTES: u128 = 16;
 
 const MODE: MapOption = MapOption {
     name: "mode",
@@ -72,7 +76,7 @@ pub static CONE: Map = Map {
         name: "cone",
         summary: "how far an empty cone over the surface opens, UV units per height unit, 0..1",
         source: "Dummer 2006; Ban, Valasek, Balint and Vad 2024",
-        version: 1,
+        version: 2,
         costly: true,
         form: Form::Single,
         channels: &[Channel::fixed("ratio", Range::LOWER_BOUND)],
@@ -91,7 +95,7 @@ pub static RELAXED_CONE: Map = Map {
         name: "relaxed_cone",
         summary: "how far a cone that a ray pierces at most once opens, UV units per height unit, 0..1",
         source: "Policarpo and Oliveira 2007; Ban, Valasek, Balint and Vad 2024",
-        version: 1,
+        version: 2,
         costly: true,
         form: Form::Single,
         channels: &[Channel::fixed("ratio", Range::LOWER_BOUND)],
@@ -106,7 +110,7 @@ pub static RELAXED_CONE: Map = Map {
 
 fn plan(grid: maps::Grid, _options: &Options) -> Plan {
     let cells: u128 = grid.cells().map(|n| n as u128 + 1).iter().product();
-    Plan::single(grid).working(cells * WORKING_BYTES)
+    Plan::single(grid).working((cells * RULES_BYTES).max(exact::working_bytes(grid)))
 }
 
 /// Relative rounding of a slope, all steps together.
@@ -118,7 +122,7 @@ const ROUNDING: f64 = 4e-7;
 /// [`BakeError::Interrupted`].
 pub fn cone_map(field: &HeightField, mode: ConeMode, progress: Progress<'_>) -> Result<Vec<f32>, BakeError> {
     match mode {
-        ConeMode::Conservative => around_texels(field, &Empty, progress),
+        ConeMode::Conservative => exact_map(field, progress),
         ConeMode::Texel => at_texels(field, &EmptyTexel, progress),
     }
 }
@@ -133,17 +137,32 @@ pub fn relaxed_cone_map(
     progress: Progress<'_>,
 ) -> Result<Vec<f32>, BakeError> {
     match mode {
-        ConeMode::Conservative => around_texels(field, &Falling, progress),
+        ConeMode::Conservative => wider_map(field, progress),
         ConeMode::Texel => at_texels(field, &FallingTexel { field }, progress),
     }
 }
 
-/// The ratio whose cone has this slope, rounded down. Slope 1 stands for all that are not steeper.
+fn exact_map(field: &HeightField, mut progress: Progress<'_>) -> Result<Vec<f32>, BakeError> {
+    let mut map = exact::steepest_rises(field, &mut progress)?;
+    map.par_iter_mut().for_each(|value| *value = ratio(*value));
+    Ok(map)
+}
+
+/// Relaxed cones, and empty ones where those are wider.
+fn wider_map(field: &HeightField, mut progress: Progress<'_>) -> Result<Vec<f32>, BakeError> {
+    let rows = field.height();
+    let mut half = |second: usize, done: usize, total: usize| {
+        progress.report(second * rows + done * rows / total.max(1), 2 * rows).is_ok()
+    };
+    let empty = exact_map(field, Progress::new(&mut |done, total| half(0, done, total)))?;
+    let mut map = around_texels(field, &Falling, Progress::new(&mut |done, total| half(1, done, total)))?;
+    map.par_iter_mut().zip(empty).for_each(|(value, empty)| *value = value.max(empty));
+    Ok(map)
+}
+
+/// The ratio whose cone has this slope, rounded down, at most 1.
 fn ratio(slope: f32) -> f32 {
-    if slope <= 1.0 {
-        return 1.0;
-    }
-    let exact = (1.0 - ROUNDING) / f64::from(slope);
+    let exact = ((1.0 - ROUNDING) / f64::from(slope)).min(1.0);
     let near = exact as f32;
     if f64::from(near) > exact { near.next_down() } else { near }
 }
@@ -157,8 +176,13 @@ fn at_texels<R: Rule>(
     let first = -field.first_texel();
     let size = [field.width(), field.height()];
     let mut map = steepest_rises(&grid, rule, [first; 2], size, &mut progress)?;
-    map.par_iter_mut().for_each(|value| *value = ratio(*value));
+    map.par_iter_mut().for_each(|value| *value = ratio_above_one(*value));
     Ok(map)
+}
+
+/// As [`ratio`]; slope 1 stands for all that are not steeper.
+fn ratio_above_one(slope: f32) -> f32 {
+    if slope <= 1.0 { 1.0 } else { ratio(slope) }
 }
 
 /// Each texel gets the least ratio of the four cells around it.
@@ -177,7 +201,7 @@ fn around_texels<R: Rule>(
         let upper = &slopes[j * (width + 1)..][..width + 1];
         let lower = &slopes[(j + 1) * (width + 1)..][..width + 1];
         for (i, value) in row.iter_mut().enumerate() {
-            *value = ratio(upper[i].max(upper[i + 1]).max(lower[i].max(lower[i + 1])));
+            *value = ratio_above_one(upper[i].max(upper[i + 1]).max(lower[i].max(lower[i + 1])));
         }
     });
     Ok(map)

@@ -32,17 +32,10 @@ fn near_half(slopes: [f32; 2], sign: i64) -> f32 {
     nearest.abs().max((0.5 * (slopes[0] + slopes[1])).abs())
 }
 
-/// Upper bounds for pairs of points with the lower one in a cell and the other there or next to it.
-pub(super) struct Near {
-    /// For all pairs.
-    pub any: f32,
-    /// For pairs where the surface falls outwards at the higher point: a slope that turns negative along
-    /// the way has changed by more than its mean.
-    pub falling: f32,
-}
-
-/// See [`Near`].
-pub(super) fn near(grid: &Grid<'_>, site: [i64; 2]) -> Near {
+/// An upper bound for pairs of points with the lower one in a cell and the other there or next to it, at
+/// which the surface falls outwards: a slope that turns negative along the way has changed by more than its
+/// mean.
+pub(super) fn near_falling(grid: &Grid<'_>, site: [i64; 2]) -> f32 {
     let mut square = 0.0_f32;
     let mut range = [[f32::INFINITY, f32::NEG_INFINITY]; 2];
     for y in -1..=1_i64 {
@@ -67,5 +60,5 @@ pub(super) fn near(grid: &Grid<'_>, site: [i64; 2]) -> Near {
     }
     let any = square.sqrt();
     let turn = (range[0][1] - range[0][0]).hypot(range[1][1] - range[1][0]);
-    Near { any, falling: any.min(turn) }
+    any.min(turn)
 }

@@ -3,12 +3,9 @@
 use heightfield::HeightField;
 
 use super::grid::{Grid, Tile};
-use super::near::near;
+use super::near::near_falling;
 use super::pair::{Patch, depth_of, steepest};
 use super::search::{Apex, Rule};
-
-/// Every rise of the bilinear surface: cones stay empty.
-pub(super) struct Empty;
 
 /// Every rise between texel centres (Dummer 2006).
 pub(super) struct EmptyTexel;
@@ -42,26 +39,6 @@ fn between(grid: &Grid<'_>, apex: &Apex, offset: [i64; 2], heights: [f32; 4], be
 
 fn touches(offset: [i64; 2]) -> bool {
     offset[0].abs() <= 1 && offset[1].abs() <= 1
-}
-
-impl Rule for Empty {
-    const FIRST: i64 = 0;
-
-    fn floor(&self, grid: &Grid<'_>, apex: &Apex) -> f32 {
-        (near(grid, apex.site).any * EASE).max(1.0)
-    }
-
-    fn is_near(&self, offset: [i64; 2]) -> bool {
-        touches(offset)
-    }
-
-    fn admits(&self, _tile: &Tile, _low: [f32; 2], _high: [f32; 2]) -> bool {
-        true
-    }
-
-    fn slope(&self, grid: &Grid<'_>, apex: &Apex, offset: [i64; 2], heights: [f32; 4], best: f64) -> f64 {
-        between(grid, apex, offset, heights, best)
-    }
 }
 
 impl Rule for EmptyTexel {
@@ -99,7 +76,7 @@ impl Rule for Falling {
     const FIRST: i64 = 0;
 
     fn floor(&self, grid: &Grid<'_>, apex: &Apex) -> f32 {
-        (near(grid, apex.site).falling * EASE).max(1.0)
+        (near_falling(grid, apex.site) * EASE).max(1.0)
     }
 
     fn is_near(&self, offset: [i64; 2]) -> bool {

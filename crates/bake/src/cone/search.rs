@@ -7,7 +7,7 @@
 
 use rayon::prelude::*;
 
-use super::grid::{Block, Grid, Tile};
+use super::grid::{Block, Bounds, Grid, Tile};
 use super::pair::may_rise;
 use crate::{BakeError, Progress};
 
@@ -45,16 +45,6 @@ pub(super) trait Rule: Sync {
     fn slope(&self, grid: &Grid<'_>, apex: &Apex, offset: [i64; 2], heights: [f32; 4], best: f64) -> f64;
 }
 
-/// What is known of the points of a tile, lengths in UV units from the block's first site.
-#[derive(Clone, Copy)]
-struct Bounds {
-    centre: [f32; 2],
-    half: [f32; 2],
-    slope: [f32; 2],
-    level: f32,
-    max: f32,
-}
-
 /// The apex as tiles are tested against it: its cell, and the slope known so far.
 #[derive(Clone, Copy)]
 struct Stand {
@@ -65,20 +55,6 @@ struct Stand {
 }
 
 impl Bounds {
-    fn new(grid: &Grid<'_>, tile: &Tile, first: [i64; 2], last: [i64; 2], origin: [i64; 2]) -> Self {
-        let side = |axis: usize, sign: f32| {
-            let (low, high) = (first[axis] - origin[axis], last[axis] - origin[axis]);
-            0.5 * (high as f32 + grid.extent + sign * low as f32) * grid.step[axis]
-        };
-        Self {
-            centre: [side(0, 1.0), side(1, 1.0)],
-            half: [side(0, -1.0), side(1, -1.0)],
-            slope: tile.slope,
-            level: tile.level,
-            max: tile.max,
-        }
-    }
-
     /// Whether there may be a point to which the surface rises from the apex with more than its slope:
     /// neither the highest point nor the plane rules that out. See [`may_rise`]: here the plane stands
     /// for the corners of `b`, and `p` leads from centre to centre.

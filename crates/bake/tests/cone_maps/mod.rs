@@ -1,6 +1,8 @@
 //! Maps and rays that the tests of cones share.
 #![allow(dead_code, missing_docs)]
 
+pub mod rises;
+
 use heightfield::{HeightField, Wrap};
 
 /// SplitMix64.
