@@ -265,6 +265,33 @@ fn flat_maps_and_lonely_peaks_have_known_cones() {
 }
 
 #[test]
+fn roots_keep_narrow_cones_in_eight_bits() {
+    use bake::encode::Range;
+    use bake::maps::{Map, Value, bake};
+    let field = noise(300, 200, Wrap::Repeat, 3);
+    for name in ["cone", "relaxed_cone"] {
+        let map = Map::named(name).unwrap();
+        let texels = |curve: &str| {
+            let options = map.info.defaults().with("curve", Value::Choice(curve.to_owned())).unwrap();
+            bake(&field, map, &options, Progress::none()).unwrap().layers.remove(0).texels
+        };
+        let (ratios, roots) = (texels("linear"), texels("sqrt"));
+        let (mut gone, mut kept) = (0, 0);
+        for (&ratio, &root) in ratios.iter().zip(&roots) {
+            assert!(f64::from(root) * f64::from(root) <= f64::from(ratio));
+            assert!((root * root - ratio).abs() <= 3e-7 * ratio);
+            let in_file = |value: f32| f64::from(Range::LOWER_BOUND.encode(value, 255)) / 255.0;
+            let back = in_file(root) * in_file(root);
+            assert!(back <= f64::from(ratio));
+            gone += usize::from(in_file(ratio) == 0.0);
+            kept += usize::from(back >= 0.8 * f64::from(ratio));
+        }
+        println!("{name}: {gone} of {} lost, {kept} within a fifth as roots", ratios.len());
+        assert!(gone > ratios.len() / 4 && kept == ratios.len());
+    }
+}
+
+#[test]
 fn bakes_can_be_stopped_and_count_up() {
     let field = noise(64, 64, Wrap::Repeat, 1);
     let mut stop = |_: usize, _: usize| false;

@@ -25,6 +25,10 @@
 //! texel's centre (Dummer 2006); the relaxed one comes from rays through other texels, sampled at equal steps
 //! (Policarpo and Oliveira, GPU Gems 3, chapter 18, 2007). Neither holds between texels.
 //!
+//! Files of 8 bits hold ratios down to 1/255 only, below which they become 0, and cones of noise are narrower.
+//! Option `curve` = `sqrt` stores square roots, as Policarpo and Oliveira do, rounded down all the same: to be
+//! squared when they are read. What searches read is never stored that way.
+//!
 //! Sources: Jonathan Dummer, Cone Step Mapping: An Iterative Ray-Heightfield Intersection Algorithm, 2006;
 //! Robert Ban, Gabor Valasek, Csaba Balint and Viktor Vad, Robust Cone Step Mapping, EGSR 2024.
 
@@ -64,6 +68,24 @@ const MODE: MapOption = MapOption {
     kind: Kind::Choice { default: "conservative", choices: &["conservative", "texel"] },
 };
 
+const CURVE: MapOption = MapOption {
+    name: "curve",
+    summary: "linear: ratios as they are; sqrt: their square roots, which keep narrow cones in 8 bits",
+    kind: Kind::Choice { default: "linear", choices: &["linear", "sqrt"] },
+};
+
+/// The map as the options want it stored: a square root is rounded so that its square is not above the ratio.
+fn stored(field: &HeightField, mut map: Vec<f32>, options: &Options) -> Vec<Layer> {
+    if options.choice(CURVE.name) == "sqrt" {
+        map.par_iter_mut().for_each(|value| {
+            let root = value.sqrt();
+            let above = f64::from(root) * f64::from(root) > f64::from(*value);
+            *value = if above { root.next_down() } else { root };
+        });
+    }
+    vec![Layer::flat(field.width(), field.height(), map)]
+}
+
 impl ConeMode {
     fn of(options: &Options) -> Self {
         if options.choice(MODE.name) == "texel" { Self::Texel } else { Self::Conservative }
@@ -80,12 +102,12 @@ pub static CONE: Map = Map {
         costly: true,
         form: Form::Single,
         channels: &[Channel::fixed("ratio", Range::LOWER_BOUND)],
-        options: &[MODE],
+        options: &[MODE, CURVE],
     },
     plan,
     bake: |field, options, progress| {
         let map = cone_map(field, ConeMode::of(options), progress)?;
-        Ok(vec![Layer::flat(field.width(), field.height(), map)])
+        Ok(stored(field, map, options))
     },
 };
 
@@ -99,12 +121,12 @@ pub static RELAXED_CONE: Map = Map {
         costly: true,
         form: Form::Single,
         channels: &[Channel::fixed("ratio", Range::LOWER_BOUND)],
-        options: &[MODE],
+        options: &[MODE, CURVE],
     },
     plan,
     bake: |field, options, progress| {
         let map = relaxed_cone_map(field, ConeMode::of(options), progress)?;
-        Ok(vec![Layer::flat(field.width(), field.height(), map)])
+        Ok(stored(field, map, options))
     },
 };
 
