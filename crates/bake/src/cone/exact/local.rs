@@ -88,14 +88,13 @@ fn steepest_corner<L: Lanes>(corners: [&[f32]; 4], per_unit: [L::F; 2], place: [
     // The side of the four cells that this one lies on: 0 within, 1 behind them, -1 before.
     let side = place.map(|at| i64::from(at == 1) - i64::from(at == -2));
     let mut greatest = zero;
-    for y in 0..2 {
-        for x in 0..2 {
+    for (y, du) in u.into_iter().enumerate() {
+        for (x, dv) in v.into_iter().enumerate() {
             // Only corners of the four cells.
             let touches = |side: i64, far: usize| side == 0 || (side > 0) == (far == 0);
             if !touches(side[0], x) || !touches(side[1], y) {
                 continue;
             }
-            let (du, dv) = (u[y], v[x]);
             let mut square = du * du + dv * dv;
             for (side, slope) in [(side[0], du), (side[1], dv)] {
                 if side > 0 {
