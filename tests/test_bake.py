@@ -53,6 +53,16 @@ def rough(wrap: str = "repeat") -> bw.HeightMap:
     return bw.HeightMap(heights, scale=0.07, tile_size=(1.5, 0.8), wrap=wrap)
 
 
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_maps_wider_than_what_is_worked_on_at_a_time(kernel: str) -> None:
+    rng = np.random.default_rng(7)
+    for size in ((7, 64), (3, 65), (40, 130), (2, 511), (5, 513), (9, 1100)):
+        for wrap in PAD:
+            hm = bw.HeightMap(rng.random(size, dtype=np.float32), scale=0.02, wrap=wrap)
+            baked = bw.bake(hm, kernel=kernel)["normal"]
+            np.testing.assert_allclose(baked, normals(hm, kernel), atol=TOLERANCE, err_msg=f"{size} {wrap}")
+
+
 def test_the_table_lists_every_kernel() -> None:
     assert set(TAPS) == set(KERNELS)
 

@@ -66,7 +66,7 @@ def test_the_sidecar_tells_where_a_map_is_from(tmp_path: Path) -> None:
     data = json.loads((tmp_path / "wall_normal.json").read_text())
     assert data["options"] == {"kernel": "scharr", "convention": "directx"}
     assert (data["scale"], data["base"], data["tile_size"], data["wrap"]) == (0.3, 0.5, [2, 1], "mirror")
-    assert (data["bumpwgpu"], data["map"], data["map_version"]) == (bw.__version__, "normal", 1)
+    assert (data["bumpwgpu"], data["map"], data["map_version"]) == (bw.__version__, "normal", 2)
     assert (data["encoding"], data["size"]) == ("uint8", [16, 16])
     assert [channel["low"] for channel in data["channels"]] == [-1, -1, -1]
     assert [file["file"] for file in data["files"]] == ["wall_normal.png"]

@@ -38,6 +38,7 @@ __all__ = [
     "bake_detail",
     "bake_file",
     "bake_map",
+    "bake_rows",
     "bake_tangents",
     "bend_normals",
     "check_normals",
@@ -51,6 +52,7 @@ __all__ = [
     "derivatives",
     "effective_bits",
     "export_search",
+    "finite_span",
     "integrate_normals",
     "judge",
     "map_bytes",
@@ -224,6 +226,17 @@ def bake_map(
     first: int,
     total: int,
 ) -> tuple[list[NDArray[Any]], list[tuple[float, float]]]: ...
+def bake_rows(
+    heights: NDArray[np.float32],
+    wrap: str,
+    extent: tuple[float, float, tuple[float, float]],
+    map: str,
+    options: _Options,
+    dtype: str,
+    progress: _Progress,
+    first: int,
+    total: int,
+) -> tuple[list[NDArray[Any]], list[tuple[float, float]]]: ...
 def check_normals(normals: NDArray[np.float32], wrap: str, heights: Field | None) -> dict[str, Any]: ...
 def compare_front(measured: Sequence[_Measured], max_failure_rate: float) -> list[tuple[int, list[int]]]: ...
 def compare_memory(field: Field, setting: _Setting) -> int: ...
@@ -248,6 +261,7 @@ def dequantise(field: Field, quantum: float, progress: _Progress) -> NDArray[np.
 def derivatives() -> list[str]: ...
 def effective_bits(samples: NDArray[Any]) -> int: ...
 def export_search(technique: str, parameters: _Parameters, wrap: str, language: str) -> str: ...
+def finite_span(plane: NDArray[np.float32]) -> tuple[float, float] | None: ...
 def integrate_normals(
     normals: NDArray[np.float32],
     convention: str,

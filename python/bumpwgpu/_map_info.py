@@ -55,7 +55,8 @@ class MapInfo(NamedTuple):
     """What a map is.
 
     `form` is "single" (one array), "levels" (a tuple of arrays, finest first) or "stack" (one array
-    whose first axis is `axis`). A channel without a range takes that of the data.
+    whose first axis is `axis`). `by_rows`: a row of it takes but a few rows of heights. A channel without
+    a range takes that of the data.
     """
 
     name: str
@@ -63,6 +64,7 @@ class MapInfo(NamedTuple):
     source: str
     version: int
     costly: bool
+    by_rows: bool
     form: Literal["single", "levels", "stack"]
     axis: str | None
     channels: tuple[MapChannel, ...]

@@ -17,7 +17,15 @@ from ._map_info import MAPS as _INFO
 from ._map_info import OPTIONS, MapChannel, MapInfo, MapOption, listing, takers
 from ._sidecar import SavedFile, write_sidecar
 from .errors import BumpWarning
-from .heightmap import HEIGHT_MAP_SETTINGS, HeightMap, HeightRange, HeightSource, Wrap, checked_extent
+from .heightmap import (
+    HEIGHT_MAP_SETTINGS,
+    BorrowedHeightMap,
+    HeightMap,
+    HeightRange,
+    HeightSource,
+    Wrap,
+    checked_extent,
+)
 from .maps import BakedMap, Maps
 from .meshes import Mesh
 
@@ -227,7 +235,7 @@ def bake(
             )
         heights = source
     else:
-        heights = HeightMap(source, **settings)
+        heights = BorrowedHeightMap(source, **settings)
     for name in given:
         if not any(_INFO[wanted].option(name) for wanted in names):
             _warn(
@@ -237,9 +245,13 @@ def bake(
     about_source = {"size": [columns, rows], **_extent_of(heights)}
     made = {}
     for at, name in enumerate(names):
-        layers, ranges = _bumpwgpu.bake_map(
-            heights._field, name, values[name], numbers, progress, at * rows, len(names) * rows
-        )
+        part = (at * rows, len(names) * rows)
+        if _INFO[name].by_rows:
+            layers, ranges = _bumpwgpu.bake_rows(
+                heights.array, heights.wrap, heights._extent, name, values[name], numbers, progress, *part
+            )
+        else:
+            layers, ranges = _bumpwgpu.bake_map(heights._field, name, values[name], numbers, progress, *part)
         made[name] = BakedMap(tuple(layers), tuple(ranges), dict(values[name]), about_source)
     return Maps(made)
 

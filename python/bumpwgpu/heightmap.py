@@ -93,7 +93,14 @@ class HeightMap:
     ((16, 16), 8, 1.0)
     """
 
-    __slots__ = ("_array", "_base", "_bits", "_field", "_scale", "_tile_size", "_wrap")
+    __slots__ = ("_array", "_base", "_bits", "_built", "_scale", "_tile_size", "_wrap")
+
+    #: Whether the heights are the map's own; see `BorrowedHeightMap`.
+    _OWN = True
+    #: None until somebody asks: of many floats that takes longer than a bake.
+    _bits: int | None
+    #: None until somebody marches or bakes what needs more than rows.
+    _built: _bumpwgpu.Field | None
 
     def __init__(
         self,
@@ -115,14 +122,22 @@ class HeightMap:
         plane, label = _pick_channel(pixels.values, channel, pixels.label, pixels.names)
         heights, bits = _normalise(plane, height_range, label)
         if flag("invert", invert):
+            bits = _effective_bits(plane) if bits is None else bits
             heights = np.subtract(np.float32(1.0), heights)
         heights = np.ascontiguousarray(heights, dtype=np.float32)
-        if heights is source or heights.base is not None or not heights.flags.owndata:
-            heights = heights.copy()
-        heights.flags.writeable = False
+        if self._OWN:
+            if heights is source or heights.base is not None or not heights.flags.owndata:
+                heights = heights.copy()
+            heights.flags.writeable = False
         self._array = heights
         self._bits = bits
-        self._field = _bumpwgpu.Field(heights, self._wrap, self._extent)
+        self._built = None
+
+    @property
+    def _field(self) -> _bumpwgpu.Field:
+        if self._built is None:
+            self._built = _bumpwgpu.Field(self._array, self._wrap, self._extent)
+        return self._built
 
     @property
     def _extent(self) -> tuple[float, float, tuple[float, float]]:
@@ -273,7 +288,7 @@ class HeightMap:
         made._wrap = self._wrap
         made._array = self._array
         made._bits = self._bits
-        made._field = _bumpwgpu.Field(made._array, made._wrap, made._extent)
+        made._built = None
         return made
 
     def save(self, path: str | os.PathLike[str]) -> Path:
@@ -337,6 +352,8 @@ class HeightMap:
     @property
     def bits(self) -> int:
         """Effective bits found in the data: 8 for 8-bit data stored in 16 bits, 32 for full floats."""
+        if self._bits is None:
+            self._bits = _effective_bits(self._array)
         return self._bits
 
     @property
@@ -362,12 +379,19 @@ class HeightMap:
     def __repr__(self) -> str:
         rows, columns = self.shape
         return (
-            f"<HeightMap {columns} x {rows}, {self._bits} bits, scale={self._scale:g}, base={self._base:g}, "
+            f"<HeightMap {columns} x {rows}, {self.bits} bits, scale={self._scale:g}, base={self._base:g}, "
             f"tile_size=({self._tile_size[0]:g}, {self._tile_size[1]:g}), wrap={self._wrap!r}>"
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return (_restore, (self._array, self._extent, self._wrap, self._bits))
+        return (_restore, (self._array, self._extent, self._wrap, self.bits))
+
+
+class BorrowedHeightMap(HeightMap):
+    """Heights that may lie in an array of the caller's, for the time of a call: nothing is copied."""
+
+    __slots__ = ()
+    _OWN = False
 
 
 def _restore(array: NDArray[np.float32], extent: tuple[Any, ...], wrap: Wrap, bits: int) -> HeightMap:
@@ -485,13 +509,20 @@ def _require_finite(plane: NDArray[Any], label: str) -> None:
         )
 
 
-def _normalise(plane: NDArray[Any], height_range: Any, label: str) -> tuple[NDArray[np.float32], int]:
-    """Heights in 0..1 as float32, and the effective bits of the data."""
+def _normalise(plane: NDArray[Any], height_range: Any, label: str) -> tuple[NDArray[np.float32], int | None]:
+    """Heights in 0..1 as float32, and the effective bits of the data; None when they can be found later.
+
+    float32 heights that are what they should be come back as they are.
+    """
     kind = plane.dtype.kind
     if kind not in "buif":
         raise TypeError(f"{label} must hold numbers, got dtype {plane.dtype}")
     # Files of the other byte order hold the same numbers.
     plane = np.asarray(plane, plane.dtype.newbyteorder("="))
+    if plane.dtype == np.float32 and height_range is None and plane.flags.c_contiguous:
+        span = _bumpwgpu.finite_span(plane)
+        if span is not None and span[0] >= 0.0 and span[1] <= 1.0:
+            return plane, None
     if kind == "f":
         _require_finite(plane, label)
     bits = _effective_bits(plane)

@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use crate::encode::Rounding;
 use crate::maps::{Channel, Form, Map, MapInfo, Plan};
 use crate::normal::single;
-use crate::rows::texel_row;
+use crate::texels::{RowSource, Texels};
 use crate::{BakeError, Progress};
 
 /// Mean and Gaussian curvature.
@@ -55,12 +55,13 @@ pub fn curvature(field: &HeightField, mut progress: Progress<'_>) -> Result<Vec<
     let per_x = width as f64 / f64::from(extent.tile_size[0]);
     let per_y = height as f64 / f64::from(extent.tile_size[1]);
     let scale = f64::from(extent.scale);
+    let texels = Texels::of(field);
     let mut map = vec![0.0_f32; width * height * 2];
     progress.report(0, height)?;
     for (batch, rows) in map.chunks_mut(BATCH_ROWS * width * 2).enumerate() {
         rows.par_chunks_mut(width * 2).enumerate().for_each(|(j, out)| {
             let j = (batch * BATCH_ROWS + j) as i64;
-            let [above, here, below] = [j - 1, j, j + 1].map(|j| texel_row(field, j));
+            let [above, here, below] = [j - 1, j, j + 1].map(|j| texels.row(j));
             for (i, texel) in out.chunks_exact_mut(2).enumerate() {
                 let (left, right) = neighbours(field, i);
                 let [a, b, c] = [left, i, right].map(|i| f64::from(above[i]));

@@ -134,6 +134,11 @@ pub trait Sample: Copy + Default + Send + Sync + 'static {
     fn signed(value: f32) -> Self;
     /// A number of 0..1.
     fn unit(value: f32) -> Self;
+    /// The samples where they are bytes.
+    #[inline(always)]
+    fn as_bytes_mut(_samples: &mut [Self]) -> Option<&mut [u8]> {
+        None
+    }
 }
 
 impl Sample for f32 {
@@ -158,6 +163,11 @@ impl Sample for u8 {
     #[inline(always)]
     fn unit(value: f32) -> Self {
         (f64::from(value) * 255.0 + 0.5) as u8
+    }
+
+    #[inline(always)]
+    fn as_bytes_mut(samples: &mut [Self]) -> Option<&mut [u8]> {
+        Some(samples)
     }
 }
 

@@ -33,8 +33,10 @@ pub mod repair;
 mod resample;
 mod rows;
 pub mod slopes;
+mod span;
 pub mod stream;
 mod sweep;
+mod texels;
 
 pub use bits::effective_bits;
 pub use cache::{Cache, bake_cached};
@@ -59,4 +61,6 @@ pub use provide::{provide, provide_for};
 pub use pyramid::{Level, pyramid};
 pub use relief::relief_map;
 pub use slopes::slopes;
+pub use span::finite_span;
 pub use stream::{HeightSettings, StreamRequest, Streamed, Values, bake_file};
+pub use texels::Texels;

@@ -26,7 +26,7 @@ pub static NORMAL_MIPS: Map = Map {
         name: "normal_mips",
         summary: "averaged normals x, y, z in -1..1, in mip levels",
         source: "Toksvig 2005",
-        version: 1,
+        version: 2,
         costly: false,
         form: Form::Levels,
         channels: &[

@@ -39,7 +39,7 @@ pub static MOMENTS: Map = Map {
         name: "moments",
         summary: "mean slopes bx, by and means of bx^2, bx by, by^2 (LEAN), in mip levels",
         source: "Olano and Baker 2010",
-        version: 1,
+        version: 2,
         costly: false,
         form: Form::Levels,
         channels: &[
@@ -64,7 +64,7 @@ pub static TOKSVIG: Map = Map {
         name: "toksvig",
         summary: "roughness alpha in 0..1 that makes up for averaged normals, in mip levels",
         source: "Toksvig 2005",
-        version: 1,
+        version: 2,
         costly: false,
         form: Form::Levels,
         channels: &[Channel::fixed("alpha", Range::UNIT)],

@@ -14,7 +14,8 @@ use heightfield::{Extent, HeightField};
 
 use crate::encode::{Range, Sample};
 use crate::maps::{Channel, Form, Kind, Layer, Map, MapInfo, MapOption, Options, Plan};
-use crate::rows::{BLOCK, Block, Fill, for_each_row};
+use crate::rows::{Block, CHUNK, Fill, for_each_row_of};
+use crate::texels::Texels;
 use crate::{BakeError, Kernel, Progress};
 
 /// Steepest slope kept, as the tangent of the angle: its square still fits a float, so a senseless
@@ -79,7 +80,7 @@ pub static NORMAL: Map = Map {
         name: "normal",
         summary: "unit normal x, y, z in -1..1",
         source: "Blinn 1978; Cohen, Olano, Manocha 1998",
-        version: 1,
+        version: 2,
         costly: false,
         form: Form::Single,
         channels: &[
@@ -102,7 +103,7 @@ pub static NORMAL_XY: Map = Map {
         name: "normal_xy",
         summary: "unit normal x, y in -1..1; z = sqrt(1 - x^2 - y^2)",
         source: "Blinn 1978; Cohen, Olano, Manocha 1998",
-        version: 1,
+        version: 2,
         costly: false,
         form: Form::Single,
         channels: &[Channel::fixed("x", Range::SIGNED), Channel::fixed("y", Range::SIGNED)],
@@ -151,18 +152,12 @@ impl Factors {
         [gx * self.x + 0.0, gy * self.y + 0.0]
     }
 
-    /// Normals of some columns in single precision, each component by itself.
+    /// The unit normal in single precision.
     #[inline(always)]
-    fn components<S: Sample>(self, block: &Block<'_>, x: &mut [S], y: &mut [S], z: &mut [S]) {
-        let n = block.gx.len();
-        let (gx, gy, x, y, z) = (block.gx, &block.gy[..n], &mut x[..n], &mut y[..n], &mut z[..n]);
-        for i in 0..n {
-            let [nx, ny] = self.slopes(gx[i], gy[i]);
-            let inverse = 1.0 / (nx * nx + ny * ny + 1.0).sqrt();
-            x[i] = S::signed(nx * inverse);
-            y[i] = S::signed(ny * inverse);
-            z[i] = S::signed(inverse);
-        }
+    fn normal(self, gx: f32, gy: f32) -> [f32; 3] {
+        let [nx, ny] = self.slopes(gx, gy);
+        let inverse = 1.0 / (nx * nx + ny * ny + 1.0).sqrt();
+        [nx * inverse, ny * inverse, inverse]
     }
 }
 
@@ -186,19 +181,19 @@ impl<S: Sample, const C: usize> Normals<S, C> {
         progress: Progress<'_>,
     ) -> Result<Vec<S>, BakeError> {
         let mut map = vec![S::default(); field.width() * field.height() * C];
-        self.bake_into(field, kernel, &mut map, progress)?;
+        self.bake_into(&Texels::of(field), kernel, &mut map, progress)?;
         Ok(map)
     }
 
     /// The whole map into memory of the caller's, `height * width * C` samples.
     pub(crate) fn bake_into(
         self,
-        field: &HeightField,
+        texels: &Texels<'_>,
         kernel: Kernel,
         map: &mut [S],
         mut progress: Progress<'_>,
     ) -> Result<(), BakeError> {
-        for_each_row(field, kernel, map, &mut progress, &self)
+        for_each_row_of(texels, kernel, map, &mut progress, &self)
     }
 }
 
@@ -208,24 +203,58 @@ impl<S: Sample, const C: usize> Fill for Normals<S, C> {
 
     #[inline(always)]
     fn fill(&self, block: &Block<'_>, out: &mut [S]) {
-        let n = block.gx.len();
-        let [mut x, mut y, mut z] = [[S::default(); BLOCK]; 3];
-        self.factors.components(block, &mut x, &mut y, &mut z);
-        let (x, y, z, heights) = (&x[..n], &y[..n], &z[..n], &block.heights[..n]);
-        let (texels, _) = out.as_chunks_mut::<C>();
-        let texels = &mut texels[..n];
-        for i in 0..n {
-            let texel = &mut texels[i];
+        if let (3, Some(bytes)) = (C, S::as_bytes_mut(out)) {
+            return self.fill_rgb8(block, bytes);
+        }
+        let [mut x, mut y, mut z] = [[S::default(); CHUNK]; 3];
+        for i in 0..CHUNK {
+            let normal = self.factors.normal(block.gx[i], block.gy[i]);
+            (x[i], y[i], z[i]) = (S::signed(normal[0]), S::signed(normal[1]), S::signed(normal[2]));
+        }
+        for (i, texel) in out.as_chunks_mut::<C>().0.iter_mut().take(CHUNK).enumerate() {
             texel[0] = x[i];
             texel[1] = y[i];
             if C > 2 {
                 texel[2] = z[i];
             }
             if C > 3 {
-                texel[3] = S::unit(heights[i]);
+                texel[3] = S::unit(block.heights[i]);
             }
         }
     }
+}
+
+impl<S, const C: usize> Normals<S, C> {
+    /// A texel is made in 32 bits, of which the last eight are then dropped: that takes one shuffle of
+    /// bytes for as many texels as a register holds, where three planes of bytes would take many.
+    #[inline(always)]
+    fn fill_rgb8(&self, block: &Block<'_>, out: &mut [u8]) {
+        const TOGETHER: usize = 16;
+        let mut packed = [0_u32; CHUNK];
+        for ((packed, &gx), &gy) in packed.iter_mut().zip(block.gx).zip(block.gy) {
+            let [x, y, z] = self.factors.normal(gx, gy);
+            *packed = code(x) | code(y) << 8 | code(z) << 16;
+        }
+        let texels = out.as_chunks_mut::<{ 3 * TOGETHER }>().0.iter_mut();
+        for (texels, packed) in texels.zip(packed.as_chunks::<TOGETHER>().0) {
+            let mut bytes = [0; 4 * TOGETHER];
+            for i in 0..TOGETHER {
+                let texel = packed[i].to_le_bytes();
+                for k in 0..4 {
+                    bytes[4 * i + k] = texel[k];
+                }
+            }
+            for k in 0..3 * TOGETHER {
+                texels[k] = bytes[k / 3 * 4 + k % 3];
+            }
+        }
+    }
+}
+
+/// A component as an integer of 8 bits.
+#[inline(always)]
+fn code(component: f32) -> u32 {
+    u8::signed(component).into()
 }
 
 /// The normal map in the field's extent, `height * width * 3` floats in -1..1, z above 0.

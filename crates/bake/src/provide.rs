@@ -1,9 +1,11 @@
-//! Baking what searches read, and attaching it to the height field.
+//! Baking what searches read, and attaching it to the height field. What was baked before, by whatever
+//! process, comes out of the [cache](crate::cache).
 
 use heightfield::technique::Reads;
 use heightfield::{BakedMap, ConeKind, ConeMap, DistanceMap, HeightField};
 
-use crate::maps::{Map, Value, bake};
+use crate::cache::bake_cached;
+use crate::maps::{Map, Value};
 use crate::{BakeError, Progress, cone, distance};
 
 /// Bakes all maps that a search reads and attaches those that the field does not have yet.
@@ -20,7 +22,7 @@ pub fn provide_for(field: &HeightField, reads: Reads, mut progress: Progress<'_>
     Ok(())
 }
 
-/// Bakes a map and attaches it to the field, unless the field has it already.
+/// Bakes a map, or takes it out of the cache, and attaches it to the field, unless the field has it already.
 ///
 /// # Errors
 /// [`BakeError::Memory`] before anything is allocated, [`BakeError::Interrupted`].
@@ -32,14 +34,14 @@ pub fn provide(field: &HeightField, map: BakedMap, progress: Progress<'_>) -> Re
         BakedMap::Cone(kind) => {
             let (recipe, mode) = recipe(kind);
             let options = recipe.info.defaults().with("mode", Value::Choice(mode.to_owned()))?;
-            let baked = bake(field, recipe, &options, progress)?;
+            let baked = bake_cached(field, recipe, &options, progress)?;
             for layer in baked.layers {
                 field.attach_cone_map(ConeMap::new(field, kind, &layer.texels)?);
             }
         }
         BakedMap::Distance => {
             let recipe = &distance::DISTANCE;
-            let baked = bake(field, recipe, &recipe.info.defaults(), progress)?;
+            let baked = bake_cached(field, recipe, &recipe.info.defaults(), progress)?;
             for layer in baked.layers {
                 field.attach_distance_map(DistanceMap::new(field, layer.depth, &layer.texels)?);
             }

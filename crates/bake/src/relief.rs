@@ -17,7 +17,7 @@ pub static RELIEF: Map = Map {
         name: "relief",
         summary: "unit normal x, y, z in -1..1 and height in 0..1",
         source: "Policarpo, Oliveira, Comba 2005",
-        version: 1,
+        version: 2,
         costly: false,
         form: Form::Single,
         channels: &[

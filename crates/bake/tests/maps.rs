@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use bake::encode::{Depth, Range, Rounding, decode};
 use bake::maps::REGISTRY;
 use bake::{
-    BakeError, Baked, FileFormat, Form, Map, Progress, Samples, bake, bake_encoded, bake_rows, read_image,
-    save,
+    BakeError, Baked, FileFormat, Form, Map, Progress, Samples, Texels, bake, bake_encoded, bake_rows,
+    read_image, save,
 };
 use common::{angle, noise};
 use heightfield::{HeightField, Wrap};
@@ -205,7 +205,14 @@ fn integers_baked_straight_are_those_of_floats_encoded() {
                         assert_eq!(straight, floats.encoded(depth), "{} {w}x{h}", map.info.name);
                     }
                     let mut again = vec![0.0_f32; floats.layers[0].texels.len()];
-                    let result = bake_rows(&field, map, &options, &mut again, Progress::none());
+                    let result = bake_rows(
+                        &Texels::of(&field),
+                        field.extent(),
+                        map,
+                        &options,
+                        &mut again,
+                        Progress::none(),
+                    );
                     assert_eq!(result.is_ok(), map.is_by_rows());
                     assert!(result.is_err() || again == floats.layers[0].texels);
                 }

@@ -6,18 +6,21 @@ use bake::encode::{Depth, Range, Sample};
 use bake::maps::REGISTRY;
 use bake::{
     BakeError, Baked, Encoded, EncodedLayer, FileFormat, Form, Grid, HeightSettings, Kind, Layer, Map,
-    MapInfo, Options, Progress, Samples, Span, StreamRequest, Value, Values, bake_cached, bake_rows,
+    MapInfo, Options, Progress, Samples, Span, StreamRequest, Texels, Value, Values, bake_cached,
 };
-use heightfield::{Extent, HeightField, Wrap};
+use heightfield::{Extent, Wrap};
 use numpy::ndarray::IxDyn;
-use numpy::{Element, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{
+    Element, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyReadonlyArrayDyn,
+    PyUntypedArrayMethods,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::errors::Raise;
 use crate::field::{Field, parse_wrap};
-use crate::run::run;
+use crate::run::{Task, run};
 
 /// Names and values of options; a boolean is looked for before numbers, which it also is.
 #[derive(FromPyObject)]
@@ -67,6 +70,7 @@ pub(crate) fn describe<'py>(py: Python<'py>, info: &MapInfo) -> PyResult<Bound<'
     entry.set_item("source", info.source)?;
     entry.set_item("version", info.version)?;
     entry.set_item("costly", info.costly)?;
+    entry.set_item("by_rows", Map::named(info.name).is_ok_and(Map::is_by_rows))?;
     let (form, axis) = match info.form {
         Form::Single => ("single", None),
         Form::Levels => ("levels", None),
@@ -162,21 +166,11 @@ pub fn bake_map<'py>(
     let options = parse_options(&map.info, options)?;
     let depth = parse_depth(dtype)?;
     let field = field.shared();
-    let job = Job { py, field: &field, map, options: &options, progress, first, total };
-    if map.is_by_rows() {
-        let array = match depth {
-            None => job.by_rows::<f32>()?,
-            Some(Depth::U8) => job.by_rows::<u8>()?,
-            Some(Depth::U16) => job.by_rows::<u16>()?,
-        };
-        let ranges = map.info.channels.iter().map(|channel| match channel.span {
-            Span::Fixed(range) => (range.low, range.high),
-            Span::Found(_) => (f32::MIN, f32::MAX),
-        });
-        return Ok((vec![array], ranges.collect()));
-    }
     let ends = |ranges: &[Range]| ranges.iter().map(|range| (range.low, range.high)).collect();
-    let baked = job.run(|progress| bake_cached(&field, map, &options, progress))?;
+    let baked = run(py, progress, |task| {
+        let mut report = part_of(task, field.height(), first, total);
+        bake_cached(&field, map, &options, Progress::new(&mut report))
+    })?;
     let Some(depth) = depth else {
         let ranges = ends(&baked.ranges());
         let arrays = baked.layers.into_iter().map(|layer| {
@@ -198,10 +192,52 @@ pub fn bake_map<'py>(
     Ok((arrays.collect::<PyResult<_>>()?, ranges))
 }
 
-/// One map to be baked, with where its progress goes.
-struct Job<'a, 'py> {
+/// Reports a part of a job: `rows` of `total`, after `first` others.
+fn part_of(task: &Task, rows: usize, first: usize, total: usize) -> impl FnMut(usize, usize) -> bool + '_ {
+    move |done, of| task.advance(first + done * rows / of.max(1), total)
+}
+
+/// Bakes one map that is made by rows, straight from the heights where they lie: finite numbers in 0..1.
+///
+/// `progress` as for `bake_map`.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "one flat call from the Python facade")]
+pub fn bake_rows<'py>(
     py: Python<'py>,
-    field: &'a HeightField,
+    heights: PyReadonlyArray2<'py, f32>,
+    wrap: &str,
+    extent: (f32, f32, [f32; 2]),
+    map: &str,
+    options: Vec<(String, Setting)>,
+    dtype: &str,
+    progress: Option<&Bound<'py, PyAny>>,
+    first: usize,
+    total: usize,
+) -> PyResult<Made<'py>> {
+    let map = Map::named(map).map_err(Raise::raise)?;
+    let options = parse_options(&map.info, options)?;
+    let [height, width] = [heights.shape()[0], heights.shape()[1]];
+    let texels =
+        Texels::new(heights.as_slice()?, [width, height], parse_wrap(wrap)?).map_err(Raise::raise)?;
+    let extent = Extent { scale: extent.0, base: extent.1, tile_size: extent.2 };
+    let job = RowJob { py, texels: &texels, extent, map, options: &options, progress, first, total };
+    let array = match parse_depth(dtype)? {
+        None => job.run::<f32>()?,
+        Some(Depth::U8) => job.run::<u8>()?,
+        Some(Depth::U16) => job.run::<u16>()?,
+    };
+    let ranges = map.info.channels.iter().map(|channel| match channel.span {
+        Span::Fixed(range) => (range.low, range.high),
+        Span::Found(_) => (f32::MIN, f32::MAX),
+    });
+    Ok((vec![array], ranges.collect()))
+}
+
+/// One map to be baked by rows, with where its progress goes.
+struct RowJob<'a, 'py> {
+    py: Python<'py>,
+    texels: &'a Texels<'a>,
+    extent: Extent,
     map: &'static Map,
     options: &'a Options,
     progress: Option<&'a Bound<'py, PyAny>>,
@@ -209,25 +245,21 @@ struct Job<'a, 'py> {
     total: usize,
 }
 
-impl<'py> Job<'_, 'py> {
-    fn run<T: Send>(&self, work: impl FnOnce(Progress<'_>) -> Result<T, BakeError> + Send) -> PyResult<T> {
-        let (rows, first, total) = (self.field.height(), self.first, self.total);
-        run(self.py, self.progress, |task| {
-            let mut report = |done: usize, of: usize| task.advance(first + done * rows / of.max(1), total);
-            work(Progress::new(&mut report))
-        })
-    }
-
+impl<'py> RowJob<'_, 'py> {
     /// Bakes straight into an array of NumPy's, whose large arrays take the system fewest steps.
-    fn by_rows<S: Sample + Element>(&self) -> PyResult<Bound<'py, PyAny>> {
-        let Self { field, map, options, .. } = *self;
-        bake::maps::check_memory(map, Grid::of(field), options, size_of::<S>()).map_err(Raise::raise)?;
-        let shape = shape(&map.info, [field.width(), field.height(), 1]);
-        let array = PyArrayDyn::<S>::zeros(self.py, IxDyn(&shape), false);
+    fn run<S: Sample + Element>(&self) -> PyResult<Bound<'py, PyAny>> {
+        let Self { texels, extent, map, options, first, total, .. } = *self;
+        let grid = texels.grid();
+        bake::maps::check_memory(map, grid, options, size_of::<S>()).map_err(Raise::raise)?;
+        let array =
+            PyArrayDyn::<S>::zeros(self.py, IxDyn(&shape(&map.info, [grid.width, grid.height, 1])), false);
         {
             let mut view = array.readwrite();
             let out = view.as_slice_mut()?;
-            self.run(|progress| bake_rows(field, map, options, out, progress))?;
+            run(self.py, self.progress, |task| {
+                let mut report = part_of(task, grid.height, first, total);
+                bake::bake_rows(texels, &extent, map, options, out, Progress::new(&mut report))
+            })?;
         }
         Ok(array.into_any())
     }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use bake::{BakeError, Image, Samples};
-use numpy::{PyArray1, PyArrayMethods, PyReadonlyArrayDyn};
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
@@ -49,4 +49,11 @@ pub fn effective_bits(py: Python<'_>, samples: &Bound<'_, PyAny>) -> PyResult<u3
         return Err(PyTypeError::new_err("samples must be uint8, uint16 or float32"));
     };
     run(py, None, |_| Ok::<_, BakeError>(bake::effective_bits(&samples)))
+}
+
+/// The smallest and the largest of C-contiguous floats; None when some are not finite.
+#[pyfunction]
+pub fn finite_span(py: Python<'_>, plane: PyReadonlyArray2<'_, f32>) -> PyResult<Option<(f32, f32)>> {
+    let plane = plane.as_slice()?;
+    run(py, None, |_| Ok::<_, BakeError>(bake::finite_span(plane)))
 }

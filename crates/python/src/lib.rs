@@ -25,7 +25,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _bumpwgpu {
     #[pymodule_export]
-    use crate::baking::{bake_file, bake_map, map_bytes, map_registry, save_map};
+    use crate::baking::{bake_file, bake_map, bake_rows, map_bytes, map_registry, save_map};
     #[pymodule_export]
     use crate::compare::{
         CompareView, SegmentReference, compare_front, compare_memory, compare_planar, compare_recommend,
@@ -40,7 +40,7 @@ mod _bumpwgpu {
     #[pymodule_export]
     use crate::field::Field;
     #[pymodule_export]
-    use crate::images::{decode_image, effective_bits, read_image};
+    use crate::images::{decode_image, effective_bits, finite_span, read_image};
     #[pymodule_export]
     use crate::march::{Cancel, march, techniques};
     #[pymodule_export]

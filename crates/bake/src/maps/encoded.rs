@@ -1,11 +1,12 @@
 //! Maps as the integers that files hold.
 
-use heightfield::HeightField;
+use heightfield::{Extent, HeightField};
 
 use super::{Baked, Grid, Map, MapInfo, Options, bake};
 use crate::encode::{Depth, Range, Sample, encode};
 use crate::normal::{Factors, NORMAL, NORMAL_XY, Normals, settings};
 use crate::relief::RELIEF;
+use crate::texels::Texels;
 use crate::{BakeError, Progress, Samples};
 
 /// A baked map in integers.
@@ -72,12 +73,12 @@ pub fn bake_encoded(
     let samples = match depth {
         Depth::U8 => {
             let mut samples = vec![0; length];
-            bake_rows(field, map, options, &mut samples, progress)?;
+            bake_rows(&Texels::of(field), field.extent(), map, options, &mut samples, progress)?;
             Samples::U8(samples)
         }
         Depth::U16 => {
             let mut samples = vec![0; length];
-            bake_rows(field, map, options, &mut samples, progress)?;
+            bake_rows(&Texels::of(field), field.extent(), map, options, &mut samples, progress)?;
             Samples::U16(samples)
         }
     };
@@ -95,27 +96,29 @@ impl Map {
 }
 
 /// Bakes a map that [is made by rows](Map::is_by_rows) into `out`, `height * width * channels` floats
-/// or integers: the same bits as [`bake`], or as [`bake_encoded`].
+/// or integers: the same bits as [`bake`], or as [`bake_encoded`]. Heights are taken as they are.
 ///
 /// # Errors
 /// [`BakeError::Shape`] when `out` has another length, or the map is none of those;
 /// [`BakeError::Interrupted`].
 pub fn bake_rows<S: Sample>(
-    field: &HeightField,
+    texels: &Texels<'_>,
+    extent: &Extent,
     map: &Map,
     options: &Options,
     out: &mut [S],
     progress: Progress<'_>,
 ) -> Result<(), BakeError> {
-    let (width, height, channels) = (field.width(), field.height(), map.info.channels.len());
+    let ([width, height], channels) = (texels.size(), map.info.channels.len());
     if !map.is_by_rows() || out.len() != width * height * channels {
         return Err(BakeError::Shape { width, height, channels, got: out.len() });
     }
     let (kernel, convention) = settings(options)?;
-    let factors = Factors::of(field, convention);
+    extent.validate()?;
+    let factors = Factors::new(texels.size(), extent, convention);
     match channels {
-        2 => Normals::<S, 2>::new(factors).bake_into(field, kernel, out, progress),
-        3 => Normals::<S, 3>::new(factors).bake_into(field, kernel, out, progress),
-        _ => Normals::<S, 4>::new(factors).bake_into(field, kernel, out, progress),
+        2 => Normals::<S, 2>::new(factors).bake_into(texels, kernel, out, progress),
+        3 => Normals::<S, 3>::new(factors).bake_into(texels, kernel, out, progress),
+        _ => Normals::<S, 4>::new(factors).bake_into(texels, kernel, out, progress),
     }
 }

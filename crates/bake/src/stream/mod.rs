@@ -21,10 +21,11 @@ use rayon::prelude::*;
 
 use crate::encode::Depth;
 use crate::files::replace::{Guarded, replace};
-use crate::kernel::Taps;
+use crate::kernel::Kernel;
 use crate::maps::{Map, Options};
 use crate::normal::{Factors, Normals, settings};
-use crate::rows::{REACH, Rows, fill_row};
+use crate::rows::{REACH, TASK_TEXELS, fill_rows};
+use crate::texels::RowSource;
 use crate::{BakeError, Progress};
 
 use heights::Heights;
@@ -124,27 +125,30 @@ fn write<S: StreamSample>(
 ) -> Result<(), BakeError> {
     let (kernel, convention) = settings(request.options)?;
     let factors = Factors::new([heights.width(), heights.height()], &request.extent, convention);
-    let taps = kernel.taps();
     match request.map.info.channels.len() {
-        2 => blocks(heights, file, format, request.wrap, &taps, &Normals::<S, 2>::new(factors)),
-        3 => blocks(heights, file, format, request.wrap, &taps, &Normals::<S, 3>::new(factors)),
-        _ => blocks(heights, file, format, request.wrap, &taps, &Normals::<S, 4>::new(factors)),
+        2 => blocks(heights, file, format, request.wrap, kernel, &Normals::<S, 2>::new(factors)),
+        3 => blocks(heights, file, format, request.wrap, kernel, &Normals::<S, 3>::new(factors)),
+        _ => blocks(heights, file, format, request.wrap, kernel, &Normals::<S, 4>::new(factors)),
     }
 }
 
 /// Rows of heights around a block: those of the block with `REACH` more above and below.
 struct Window {
     width: usize,
+    wrap: Wrap,
     rows: Vec<f32>,
 }
 
-impl Window {
-    fn row(&self, at: usize) -> &[f32] {
-        &self.rows[at * self.width..][..self.width]
+impl RowSource for Window {
+    /// Row 0 is the first of the block.
+    #[inline(always)]
+    fn row(&self, at: i64) -> &[f32] {
+        &self.rows[(at + REACH as i64) as usize * self.width..][..self.width]
     }
 
-    fn around(&self, at: usize) -> Rows<'_> {
-        [0, 1, 2, 3, 4].map(|k| self.row(at + k))
+    #[inline(always)]
+    fn wrap(&self) -> Wrap {
+        self.wrap
     }
 }
 
@@ -153,13 +157,14 @@ fn blocks<S: StreamSample, const C: usize>(
     file: &mut Guarded<'_, '_>,
     format: sink::Format,
     wrap: Wrap,
-    taps: &Taps,
+    kernel: Kernel,
     fill: &Normals<S, C>,
 ) -> Result<(), BakeError> {
     let (width, height) = (heights.width(), heights.height());
     let block = (BLOCK_TEXELS / width).max(1);
+    let task = (TASK_TEXELS / width).max(1);
     let mut rows = RowsInOrder::new(heights, wrap)?;
-    let mut window = Window { width, rows: Vec::new() };
+    let mut window = Window { width, wrap, rows: Vec::new() };
     rows.append(&mut window, -(REACH as i64), block.min(height) + 2 * REACH)?;
     let mut out = Vec::new();
     write_rows(file, format, [width, height, C], |sink| {
@@ -168,13 +173,13 @@ fn blocks<S: StreamSample, const C: usize>(
             let after = block.min(height - first - count);
             out.resize(count * width * C, S::default());
             // The next block is read while this one is made and written.
-            let mut next = Window { width, rows: window.rows[count * width..].to_vec() };
+            let mut next = Window { width, wrap, rows: window.rows[count * width..].to_vec() };
             let mut read = Ok(());
             rayon::in_place_scope(|scope| {
                 let (next, rows, read) = (&mut next, &mut rows, &mut read);
                 scope.spawn(move |_| *read = rows.append(next, (first + count + REACH) as i64, after));
-                out.par_chunks_mut(width * C).enumerate().for_each(|(at, out)| {
-                    fill_row(window.around(at), wrap, taps, fill, out);
+                out.par_chunks_mut(task * width * C).enumerate().for_each(|(at, out)| {
+                    fill_rows(&window, (at * task) as i64, kernel, fill, out);
                 });
                 sink.write(&out, first + count)
             })?;

@@ -36,14 +36,15 @@ impl Grid {
 
     /// `LANES + 1` heights of row `main` from place `from` of the cross axis, which may be any.
     #[inline(always)]
-    pub fn lanes(&self, main: usize, from: i64) -> &[f32] {
+    pub fn lanes(&self, main: usize, from: i64) -> &[f32; LANES + 1] {
         let n = self.cross as i64;
         let start = match self.wrap {
             Wrap::Repeat => from.rem_euclid(n),
             Wrap::Mirror => from.rem_euclid(2 * n),
             Wrap::Clamp => from.clamp(-(MARGIN as i64), n),
         };
-        &self.heights[main * self.stride + (start + MARGIN as i64) as usize..][..=LANES]
+        let at = main * self.stride + (start + MARGIN as i64) as usize;
+        self.heights[at..].first_chunk().unwrap_or(&[0.0; LANES + 1])
     }
 
     /// All of row `main` and one height more, from place `from`, at most `NEAR + 1` from 0.

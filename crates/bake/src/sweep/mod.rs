@@ -20,13 +20,13 @@ mod hull;
 mod near;
 mod plan;
 
-use heightfield::HeightField;
+use heightfield::{HeightField, lanes};
 use rayon::prelude::*;
 
 use crate::maps;
 
 use grid::Grid;
-use hull::{Far, Scratch, sweep_lines};
+use hull::{Far, Scratch, SweepLines};
 use plan::Plan;
 
 /// Lines swept together. Their samples share one weight, so a lane of samples is one vector.
@@ -97,7 +97,8 @@ impl Sweep<'_> {
         // What an earlier azimuth left stands only where no texel reads.
         lines.far.resize(blocks * block, Far::default());
         lines.far.par_chunks_mut(block).enumerate().for_each_init(Scratch::default, |scratch, (b, out)| {
-            sweep_lines(&self.plan, self.grid, self.plan.first_line + (b * LANES) as i64, scratch, out);
+            let line = self.plan.first_line + (b * LANES) as i64;
+            lanes::dispatch(SweepLines { plan: &self.plan, grid: self.grid, line, scratch, out });
         });
     }
 
@@ -112,18 +113,7 @@ impl Sweep<'_> {
         let lower = offset.floor();
         let share = (offset - lower) as f32;
         self.gather(lines, step, lower as i64 - plan.first_line, n + 1, &mut scratch.far);
-        near::rises(plan, self.grid, step as i64, out);
-        let slope = plan.slope as f32;
-        let (before, own, after) = near::neighbours(plan, self.grid, step as i64);
-        let bulge = share * (1.0 - share);
-        let far = &scratch.far[..=n];
-        for j in 0..n {
-            // How much higher the texel is than what its two lines say of it.
-            let excess = bulge * (2.0 * own[j] - before[j] - after[j]);
-            let far_sine = |far: &Far| sine((far.rise - excess * far.nearness) * slope);
-            let (a, b) = (far_sine(&far[j]), far_sine(&far[j + 1]));
-            out[j] = sine(out[j] * slope).max(a + (b - a) * share);
-        }
+        lanes::dispatch(RowOfTexels { sweep: self, step: step as i64, share, far: &scratch.far[..=n], out });
     }
 
     /// `count` points of the lines at a step, from line `first` of the plan on.
@@ -147,6 +137,41 @@ impl Sweep<'_> {
         }
         // Open lines reach one beyond the last texel wherever its weight is not 0.
         row.resize(count, Far::default());
+    }
+}
+
+/// A row of texels to be given their horizon.
+struct RowOfTexels<'a> {
+    sweep: &'a Sweep<'a>,
+    step: i64,
+    /// How far each texel lies from its line to the next.
+    share: f32,
+    /// What is seen along the line of each texel, and the one after the last.
+    far: &'a [Far],
+    out: &'a mut [f32],
+}
+
+impl lanes::Kernel for RowOfTexels<'_> {
+    type Output = ();
+
+    /// Of the lanes only the instruction set is taken.
+    #[inline(always)]
+    fn run<L: lanes::Lanes>(self) {
+        let Self { sweep: Sweep { plan, grid }, step, share, far, out } = self;
+        let n = out.len();
+        near::rises(plan, grid, step, out);
+        let slope = plan.slope as f32;
+        let (before, own, after) = near::neighbours(plan, grid, step);
+        let (before, own, after, far) = (&before[..n], &own[..n], &after[..n], &far[..=n]);
+        let bulge = share * (1.0 - share);
+        for j in 0..n {
+            // How much higher the texel is than what its two lines say of it.
+            let excess = bulge * (2.0 * own[j] - before[j] - after[j]);
+            let a = sine((far[j].rise - excess * far[j].nearness) * slope);
+            let b = sine((far[j + 1].rise - excess * far[j + 1].nearness) * slope);
+            let (near, far) = (sine(out[j] * slope), a + (b - a) * share);
+            out[j] = if near > far { near } else { far };
+        }
     }
 }
 

@@ -5,54 +5,64 @@ use super::{Grid, Plan};
 
 /// The steepest rise within the near steps, height per step and at least 0, for the row of texels
 /// `step` steps along.
+#[inline(always)]
 pub(super) fn rises(plan: &Plan, grid: &Grid, step: i64, out: &mut [f32]) {
     let n = out.len();
     let own = &row(plan, grid, step, 0)[..n];
     out.fill(0.0);
-    let rows = |sample: &Sample| {
-        let near = row(plan, grid, step + sample.column, sample.row);
-        let next = if sample.column_share > 0.0 {
-            row(plan, grid, step + sample.column + 1, sample.row)
-        } else {
-            near
-        };
-        (near, next)
-    };
     if let [middle, end, ..] = plan.near.as_slice() {
         // Up to the first row or column the surface is a parabola along the line; its slope at the
         // texel follows from three heights.
         let scale = (1.0 / end.step) as f32;
-        let (a, b) = (rows(middle), rows(end));
+        let (a, b) = (rows(plan, grid, step, middle), rows(plan, grid, step, end));
         for (j, rise) in out.iter_mut().enumerate() {
             let (half, whole) = (at(middle, a, j) - own[j], at(end, b, j) - own[j]);
-            *rise = rise.max((4.0 * half - whole) * scale);
+            *rise = larger(*rise, (4.0 * half - whole) * scale);
         }
     }
     for sample in &plan.near {
         let inverse = (1.0 / sample.step) as f32;
-        let rows = rows(sample);
+        let rows = rows(plan, grid, step, sample);
         let (near, next) = (&rows.0[..=n], &rows.1[..=n]);
         if sample.column_share == 0.0 {
             for (j, rise) in out.iter_mut().enumerate() {
                 let height = near[j] + (near[j + 1] - near[j]) * sample.row_share;
-                *rise = rise.max((height - own[j]) * inverse);
+                *rise = larger(*rise, (height - own[j]) * inverse);
             }
         } else if sample.row_share == 0.0 {
             for (j, rise) in out.iter_mut().enumerate() {
                 let height = near[j] + (next[j] - near[j]) * sample.column_share;
-                *rise = rise.max((height - own[j]) * inverse);
+                *rise = larger(*rise, (height - own[j]) * inverse);
             }
         } else {
             for (j, rise) in out.iter_mut().enumerate() {
-                *rise = rise.max((at(sample, (near, next), j) - own[j]) * inverse);
+                *rise = larger(*rise, (at(sample, (near, next), j) - own[j]) * inverse);
             }
         }
     }
 }
 
+/// The larger of two numbers, neither of which is NaN: one instruction.
+#[inline(always)]
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
 /// Heights of the texels before, at and after each texel of a row on the cross axis.
+#[inline(always)]
 pub(super) fn neighbours<'a>(plan: &Plan, grid: &'a Grid, step: i64) -> (&'a [f32], &'a [f32], &'a [f32]) {
     (row(plan, grid, step, -1), row(plan, grid, step, 0), row(plan, grid, step, 1))
+}
+
+/// The rows before and after a sample.
+#[inline(always)]
+fn rows<'a>(plan: &Plan, grid: &'a Grid, step: i64, sample: &Sample) -> (&'a [f32], &'a [f32]) {
+    let near = row(plan, grid, step + sample.column, sample.row);
+    if sample.column_share > 0.0 {
+        (near, row(plan, grid, step + sample.column + 1, sample.row))
+    } else {
+        (near, near)
+    }
 }
 
 #[inline(always)]

@@ -35,6 +35,12 @@ impl Sample {
             column_share: (step - step.floor()) as f32,
         }
     }
+
+    /// How far along it lies between two others.
+    #[inline(always)]
+    pub fn share_of(&self, before: &Self, after: &Self) -> f32 {
+        ((self.step - before.step) / (after.step - before.step)) as f32
+    }
 }
 
 /// The lines of one azimuth.
@@ -108,6 +114,7 @@ impl Plan {
     }
 
     /// The steps `first..=last` of a line that pass a texel, if there are any.
+    #[inline(always)]
     pub fn receivers(&self, line: i64) -> Option<(usize, usize)> {
         let last = self.steps as f64 - 1.0;
         if self.cyclic {
@@ -129,6 +136,7 @@ impl Plan {
 
     /// How far a line is followed whose last receiver is `last`: one more length of the map, or to
     /// where the surface is level for ever.
+    #[inline(always)]
     pub fn end(&self, line: i64, last: usize) -> usize {
         let reach = last + self.steps;
         if self.wrap != Wrap::Clamp {
@@ -140,6 +148,7 @@ impl Plan {
     }
 
     /// The samples of steps `first..=last`, wherever a line meets a row or column of texels.
+    #[inline(always)]
     pub fn samples(&self, first: usize, last: usize) -> &[Sample] {
         &self.far[self.whole[first] as usize..=self.whole[last] as usize]
     }

@@ -1,13 +1,14 @@
 //! Horizon maps on the device: one layer an azimuth, 16-bit floats.
 
-use bake::Progress;
+use bake::maps::{Map, Value};
+use bake::{Progress, bake_cached};
 use half::f16;
 use heightfield::HeightField;
 use rayon::prelude::*;
 
 use crate::{Device, RenderError};
 
-/// Bakes the horizon of a height field and uploads it as a texture array.
+/// Bakes the horizon of a height field, or takes it out of the cache, and uploads it as a texture array.
 pub(crate) fn horizon(
     device: &Device,
     field: &HeightField,
@@ -19,8 +20,11 @@ pub(crate) fn horizon(
     Device::check("side of a horizon map, in texels,", width.max(height) as u64, longest)?;
     let layers = u64::from(limits.max_texture_array_layers);
     Device::check("azimuths of a horizon map", u64::from(azimuths), layers)?;
-    let sines = bake::horizon_map(field, azimuths as usize, Progress::none())?;
-    let texels: Vec<u16> = sines.par_iter().map(|&sine| f16::from_f32(sine).to_bits()).collect();
+    let map = Map::named("horizon")?;
+    let options = map.info.defaults().with("azimuths", Value::Whole(azimuths.into()))?;
+    let baked = bake_cached(field, map, &options, Progress::none())?;
+    let sines = baked.layers.par_iter().flat_map(|layer| &layer.texels);
+    let texels: Vec<u16> = sines.map(|&sine| f16::from_f32(sine).to_bits()).collect();
     let size = wgpu::Extent3d { width: width as u32, height: height as u32, depth_or_array_layers: azimuths };
     let descriptor = wgpu::TextureDescriptor {
         label: Some("horizon"),
