@@ -15,7 +15,12 @@ fn shade_relief(position: vec3f, point: SurfacePoint) -> ReliefTargets {
     let direction = position - draw.eye.xyz;
     let ray = texture_ray(
         point.surface, direction, point.uv, material.scale, material.base, material.period);
-    let found = search(ray.start, ray.delta, ray.cos_theta);
+    // Pixels drawn only for their neighbours' derivatives may read zeros from buffers, the 1 behind the eye among
+    // them. Marched, they would follow a wrong ray over ground of height 0 for as long as the search lets them.
+    var found = found_left(0u);
+    if draw.eye.w != 0.0 {
+        found = search(ray.start, ray.delta, ray.cos_theta);
+    }
 
     let hit = ray.start + ray.delta * found.tau;
     let hit_position = position + direction * (ray.t_start + found.tau * ray.t_length);
