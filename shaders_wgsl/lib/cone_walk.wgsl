@@ -6,33 +6,8 @@
 // once: a jump that ends there is halved, and what is left of it followed cell by cell.
 // Twin of crates/heightfield/src/search/cone_walk.rs.
 #import "lib/found.wgsl"
-#import "lib/bilinear.wgsl"
-#import "lib/walk_axis.wgsl"
+#import "lib/cell_walk.wgsl"
 #import "bindings/cone.wgsl"
-
-// Farther than this, in cells, 32 bits no longer tell cells apart.
-const FARTHEST: f32 = 1e9;
-// Farther from the surface than this, a start is not on it.
-const ON_SURFACE: f32 = 1e-3;
-// A light ray that enters a cell this close to its surface still leaves the point it started from: 8 ulps of 1.
-const STILL_ON_SURFACE: f32 = 9.5e-7;
-
-// Index of the cell that the ray is in.
-fn cell_index(x: WalkAxis, y: WalkAxis) -> u32 {
-    return walk_axis_id(y) * (height_info.cells.x + 1u) + walk_axis_id(x);
-}
-
-// The four corner heights of a cell.
-fn cell_heights(index: u32) -> vec4f {
-    let below = index + height_info.cells.x + 1u;
-    return vec4f(corners[index], corners[index + 1u], corners[below], corners[below + 1u]);
-}
-
-// The ray in its cell at time `t`, at height `z`.
-fn ray_in_cell(x: WalkAxis, y: WalkAxis, z: f32, t: f32, direction: vec3f) -> CellRay {
-    let local = vec2f(walk_axis_local(x, t), walk_axis_local(y, t));
-    return cell_ray(cell_heights(cell_index(x, y)), local, z, t, direction);
-}
 
 // With `relaxed` the buffer holds the relaxed cones behind the empty ones.
 fn walk(start: vec3f, delta: vec3f, from_surface: bool, most_steps: i32, relaxed: bool, halvings: i32) -> Found {
@@ -109,12 +84,7 @@ fn walk(start: vec3f, delta: vec3f, from_surface: bool, most_steps: i32, relaxed
                 y.cell = next_y.cell;
             }
         } else {
-            var s: f32;
-            if on_surface {
-                s = root_from_surface(ray, exit - t);
-            } else {
-                s = cell_root(ray, exit - t);
-            }
+            let s = root_in_cell(ray, exit - t, on_surface);
             if s >= 0.0 {
                 return found_hit(t + s, steps);
             }

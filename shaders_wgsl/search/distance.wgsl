@@ -4,18 +4,11 @@
 // start, delta: texture-space segment (u, v, z); cos_theta: cosine between ray and normal.
 // Twin of crates/heightfield/src/search/distance.rs.
 #import "lib/found.wgsl"
-#import "lib/bilinear.wgsl"
-#import "lib/walk_axis.wgsl"
+#import "lib/cell_walk.wgsl"
 #import "bindings/distance.wgsl"
 
 override steps: i32 = 16384;
 
-// Farther than this, in cells, 32 bits no longer tell cells apart.
-const FARTHEST: f32 = 1e9;
-// Farther from the surface than this, a start is not on it.
-const ON_SURFACE: f32 = 1e-3;
-// A light ray that enters a cell this close to its surface still leaves the point it started from.
-const STILL_ON_SURFACE: f32 = 9.5e-7;
 // What rounding of the position costs a step, as a share of the way that the ray came, and of the step.
 const DRIFT: f32 = 9.5e-7;
 
@@ -53,15 +46,10 @@ fn trace(start: vec3f, delta: vec3f, from_surface: bool) -> Found {
     var x = walk_axis_new(position.x, direction.x, height_info.cells.x, periodic);
     var y = walk_axis_new(position.y, direction.y, height_info.cells.y, periodic);
     let inverse_speed = 1.0 / max(length(delta * distances.info.metric), 1e-30);
-    let stride = height_info.cells.x + 1u;
     var z_start = start.z;
     var t = 0.0;
     for (var i = 1; i <= steps; i++) {
-        let cell = vec2u(walk_axis_id(x), walk_axis_id(y));
-        let at = cell.y * stride + cell.x;
-        let heights = vec4f(corners[at], corners[at + 1u], corners[at + stride], corners[at + stride + 1u]);
-        let local = vec2f(walk_axis_local(x, t), walk_axis_local(y, t));
-        let ray = cell_ray(heights, local, z_start + dz * t, t, direction);
+        let ray = ray_in_cell(x, y, z_start + dz * t, t, direction);
         var gap = ray.gap;
         if from_surface && i == 1 && abs(gap) <= ON_SURFACE {
             z_start -= gap;
@@ -74,6 +62,8 @@ fn trace(start: vec3f, delta: vec3f, from_surface: bool) -> Found {
         let exit_x = walk_axis_exit(x);
         let exit_y = walk_axis_exit(y);
         let exit = min(exit_x, exit_y);
+        let cell = vec2u(walk_axis_id(x), walk_axis_id(y));
+        let local = vec2f(walk_axis_local(x, t), walk_axis_local(y, t));
         let free = least_distance(cell, local, z_start + dz * t) * inverse_speed;
         let jump = t + (free * (1.0 - DRIFT) - t * DRIFT);
         if jump > exit {
@@ -81,12 +71,7 @@ fn trace(start: vec3f, delta: vec3f, from_surface: bool) -> Found {
             x.cell = walk_axis_place(x, t);
             y.cell = walk_axis_place(y, t);
         } else {
-            var s: f32;
-            if on_surface {
-                s = root_from_surface(ray, exit - t);
-            } else {
-                s = cell_root(ray, exit - t);
-            }
+            let s = root_in_cell(ray, exit - t, on_surface);
             if s >= 0.0 {
                 return found_hit(t + s, u32(i));
             }

@@ -5,10 +5,10 @@
 mod cone_maps;
 
 use bake::{Progress, provide_for};
-use cone_maps::{Random, maps, noise, waves};
+use cone_maps::{light_faults, maps, noise, rays, waves};
 use heightfield::{
-    Extent, HeightField, HeightFieldError, Hits, MarchOptions, RayArray, Segment, Status, Technique, Wrap,
-    march, oracle,
+    Extent, HeightField, HeightFieldError, Hits, MarchOptions, RayArray, Status, Technique, Wrap, march,
+    oracle,
 };
 
 const RAYS: usize = 350;
@@ -17,25 +17,6 @@ fn ready(field: &HeightField, name: &str) -> Technique {
     let technique = Technique::named(name).unwrap();
     provide_for(field, technique.info.reads, Progress::none()).unwrap();
     technique
-}
-
-/// Rays from the lid at 90 to 2 degrees, some along the axes and diagonals.
-fn rays(field: &HeightField, seed: u64) -> (Vec<f64>, Vec<f64>) {
-    let mut random = Random(seed);
-    let extent = field.extent();
-    let (mut origins, mut directions) = (Vec::new(), Vec::new());
-    for i in 0..RAYS {
-        let elevation = [90.0_f64, 60.0, 45.0, 20.0, 10.0, 5.0, 2.0][i % 7].to_radians();
-        let turn = match i % 5 {
-            0 => std::f64::consts::FRAC_PI_4 * (i % 8) as f64,
-            _ => random.range(0.0, std::f64::consts::TAU),
-        };
-        let run = f64::from(extent.scale) * elevation.cos() / elevation.sin();
-        origins.extend([random.range(-1.0, 2.0), random.range(-1.0, 2.0), 1.0]);
-        directions.extend([run * turn.cos(), run * turn.sin(), -1.0]);
-    }
-    let single = |values: Vec<f64>| values.into_iter().map(|x| f64::from(x as f32)).collect();
-    (single(origins), single(directions))
 }
 
 fn run(field: &HeightField, technique: &Technique, rays: &(Vec<f64>, Vec<f64>)) -> Hits {
@@ -88,7 +69,7 @@ fn nothing_is_missed_with_our_maps() {
     for (w, h) in [(40, 27), (1, 20), (17, 1), (1, 1)] {
         for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
             for (name, field) in maps(w, h, wrap) {
-                let rays = rays(&field, 11);
+                let rays = rays(&field, RAYS, 11);
                 for search in ["cone", "relaxed_cone"] {
                     let (wrong, worst) = faults(&field, &ready(&field, search), &rays);
                     assert_eq!(wrong, 0, "{search} on {name} {w}x{h} {wrap:?}");
@@ -103,7 +84,7 @@ fn nothing_is_missed_with_our_maps() {
 fn published_maps_miss_and_the_check_sees_it() {
     let extent = Extent { scale: 0.3, ..Extent::default() };
     let field = noise(48, 48, Wrap::Repeat, 5).with_extent(extent).unwrap();
-    let rays = rays(&field, 2);
+    let rays = rays(&field, RAYS, 2);
     for (search, least) in [("cone_texel", 2), ("relaxed_cone_texel", 2)] {
         let (wrong, _) = faults(&field, &ready(&field, search), &rays);
         println!("{search}: {wrong} of {RAYS}");
@@ -114,7 +95,7 @@ fn published_maps_miss_and_the_check_sees_it() {
 #[test]
 fn cones_save_steps_on_smooth_ground() {
     let field = waves(128, 128, Wrap::Repeat);
-    let rays = rays(&field, 4);
+    let rays = rays(&field, RAYS, 4);
     let steps = |name: &str| {
         let hits = run(&field, &ready(&field, name), &rays);
         hits.steps.unwrap().iter().map(|&n| f64::from(n)).sum::<f64>() / RAYS as f64
@@ -130,17 +111,7 @@ fn light_rays_are_blocked_where_the_surface_blocks_them() {
         for (name, field) in maps(30, 20, wrap) {
             for search in ["cone", "relaxed_cone"] {
                 let technique = ready(&field, search);
-                let mut random = Random(9);
-                let mut differing = 0;
-                for _ in 0..RAYS {
-                    let (u, v) = (random.range(0.0, 1.0), random.range(0.0, 1.0));
-                    let z = field.height_at(u, v);
-                    let towards = [random.range(-1.0, 1.0), random.range(-1.0, 1.0), random.range(0.05, 3.0)];
-                    let truth = oracle::occluded(&field, [u, v, z], towards);
-                    let segment = Segment::clip([u, v, z], towards, 1.0, heightfield::march::period(wrap));
-                    let found = segment.is_some_and(|s| technique.occluded(&field, s.start, s.delta, 1.0));
-                    differing += usize::from(truth != found);
-                }
+                let differing = light_faults(&field, &technique, RAYS);
                 // Rays along the surface go either way by rounding; measured: at most 1.
                 assert!(differing <= 3, "{search} on {name} {wrap:?}: {differing} of {RAYS} differ");
             }

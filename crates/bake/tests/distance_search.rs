@@ -5,10 +5,10 @@
 mod cone_maps;
 
 use bake::{Progress, distance_map, provide_for};
-use cone_maps::{Random, from_fn, maps, waves};
+use cone_maps::{from_fn, light_faults, maps, rays, waves};
 use heightfield::{
-    DistanceMap, Extent, HeightField, HeightFieldError, MarchOptions, RayArray, Segment, Status, Technique,
-    Wrap, march, oracle,
+    DistanceMap, Extent, HeightField, HeightFieldError, MarchOptions, RayArray, Status, Technique, Wrap,
+    march, oracle,
 };
 
 const RAYS: usize = 500;
@@ -20,29 +20,10 @@ fn ready(field: &HeightField) -> Technique {
     technique
 }
 
-/// Rays from the lid at 90 to 2 degrees, some along the axes and diagonals.
-fn rays(field: &HeightField, seed: u64) -> (Vec<f64>, Vec<f64>) {
-    let mut random = Random(seed);
-    let scale = f64::from(field.extent().scale);
-    let (mut origins, mut directions) = (Vec::new(), Vec::new());
-    for i in 0..RAYS {
-        let elevation = [90.0_f64, 60.0, 45.0, 20.0, 10.0, 5.0, 2.0][i % 7].to_radians();
-        let turn = match i % 5 {
-            0 => std::f64::consts::FRAC_PI_4 * (i % 8) as f64,
-            _ => random.range(0.0, std::f64::consts::TAU),
-        };
-        let run = scale * elevation.cos() / elevation.sin();
-        origins.extend([random.range(-1.0, 2.0), random.range(-1.0, 2.0), 1.0]);
-        directions.extend([run * turn.cos(), run * turn.sin(), -1.0]);
-    }
-    let single = |values: Vec<f64>| values.into_iter().map(|x| f64::from(x as f32)).collect();
-    (single(origins), single(directions))
-}
-
 /// Rays whose first hit was skipped, seen from the surface between it and the hit reported; the largest
 /// error of the others in heights; and the mean number of steps.
 fn faults(field: &HeightField, technique: &Technique) -> (usize, f64, f64) {
-    let (origins, directions) = rays(field, 11);
+    let (origins, directions) = rays(field, RAYS, 11);
     let options = MarchOptions::default();
     let (o, d) = (RayArray::F64(&origins), RayArray::F64(&directions));
     let hits = march(field, technique, o, d, &options).unwrap();
@@ -116,17 +97,7 @@ fn light_is_blocked_where_the_surface_blocks_it() {
     for wrap in WRAPS {
         for (name, field) in maps(48, 40, wrap) {
             let technique = ready(&field);
-            let mut random = Random(9);
-            let mut differing = 0;
-            for _ in 0..RAYS {
-                let (u, v) = (random.range(0.0, 1.0), random.range(0.0, 1.0));
-                let z = field.height_at(u, v);
-                let towards = [random.range(-1.0, 1.0), random.range(-1.0, 1.0), random.range(0.05, 3.0)];
-                let truth = oracle::occluded(&field, [u, v, z], towards);
-                let segment = Segment::clip([u, v, z], towards, 1.0, heightfield::march::period(wrap));
-                let found = segment.is_some_and(|s| technique.occluded(&field, s.start, s.delta, 1.0));
-                differing += usize::from(truth != found);
-            }
+            let differing = light_faults(&field, &technique, RAYS);
             // Rays along the surface go either way by rounding.
             assert!(differing <= 2, "{name} {wrap:?}: {differing} differ");
         }

@@ -92,11 +92,7 @@ pub(crate) fn march_one<S: Search>(search: &S, field: &HeightField, chunk: &mut 
         chunk.write(i, Status::Left, 0.0, 0, || [0.0; 2]);
         return;
     };
-    let found = if chunk.from_surface {
-        search.leave(field, segment.start, segment.delta, cos_theta)
-    } else {
-        search.search(field, segment.start, segment.delta, cos_theta)
-    };
+    let found = search.trace(field, segment.start, segment.delta, cos_theta, chunk.from_surface);
     let status = match found.status {
         Status::Left if !segment.closed => Status::Unconverged,
         status => status,

@@ -3,7 +3,7 @@
 
 pub mod rises;
 
-use heightfield::{HeightField, Wrap};
+use heightfield::{HeightField, Segment, Technique, Wrap, oracle};
 
 /// SplitMix64.
 pub struct Random(pub u64);
@@ -60,4 +60,40 @@ pub fn height(field: &HeightField, at: [f64; 2]) -> f64 {
 /// Values of one a texel as a surface, to interpolate between them as the field does.
 pub fn of(field: &HeightField, values: &[f32]) -> HeightField {
     HeightField::new(values, field.width(), field.height(), field.wrap()).unwrap()
+}
+
+/// Rays from the lid at 90 to 2 degrees, some along the axes and diagonals.
+pub fn rays(field: &HeightField, count: usize, seed: u64) -> (Vec<f64>, Vec<f64>) {
+    let mut random = Random(seed);
+    let extent = field.extent();
+    let (mut origins, mut directions) = (Vec::new(), Vec::new());
+    for i in 0..count {
+        let elevation = [90.0_f64, 60.0, 45.0, 20.0, 10.0, 5.0, 2.0][i % 7].to_radians();
+        let turn = match i % 5 {
+            0 => std::f64::consts::FRAC_PI_4 * (i % 8) as f64,
+            _ => random.range(0.0, std::f64::consts::TAU),
+        };
+        let run = f64::from(extent.scale) * elevation.cos() / elevation.sin();
+        origins.extend([random.range(-1.0, 2.0), random.range(-1.0, 2.0), 1.0]);
+        directions.extend([run * turn.cos(), run * turn.sin(), -1.0]);
+    }
+    let single = |values: Vec<f64>| values.into_iter().map(|x| f64::from(x as f32)).collect();
+    (single(origins), single(directions))
+}
+
+/// How many of `count` rays from the surface to a light are judged otherwise than by the exact search in `f64`.
+pub fn light_faults(field: &HeightField, technique: &Technique, count: usize) -> usize {
+    let mut random = Random(9);
+    let period = heightfield::march::period(field.wrap());
+    let mut differing = 0;
+    for _ in 0..count {
+        let (u, v) = (random.range(0.0, 1.0), random.range(0.0, 1.0));
+        let z = field.height_at(u, v);
+        let towards = [random.range(-1.0, 1.0), random.range(-1.0, 1.0), random.range(0.05, 3.0)];
+        let truth = oracle::occluded(field, [u, v, z], towards);
+        let segment = Segment::clip([u, v, z], towards, 1.0, period);
+        let found = segment.is_some_and(|s| technique.occluded(field, s.start, s.delta, 1.0));
+        differing += usize::from(truth != found);
+    }
+    differing
 }

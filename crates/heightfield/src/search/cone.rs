@@ -12,29 +12,17 @@ use super::cone_walk::ConeWalk;
 use crate::{ConeKind, Found, HeightField};
 
 technique! {
-    /// Parameters of [`search`](Search::search) as described above.
+    /// Parameters of [`search`](Search::trace) as described above.
     Cone = "cone", reads Cone, casts_shadows true,
     summary "steps as far as an empty cone reaches, closed-form cells near the surface: misses nothing",
     source "Dummer 2006; Ban, Valasek, Balint and Vad 2024",
     parameters { steps: 16384 in 1..=65536, "Most steps; a ray that needs more is unconverged."; }
 }
 
-impl Cone {
-    #[inline(always)]
-    fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, from_surface: bool) -> Found {
-        let walk = ConeWalk { empty: ConeKind::Cone, relaxed: None, refine: 0, most_steps: self.steps };
-        walk.trace::<false>(field, start, delta, from_surface)
-    }
-}
-
 impl Search for Cone {
     #[inline(always)]
-    fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
-        self.trace(field, start, delta, false)
-    }
-
-    #[inline(always)]
-    fn leave(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
-        self.trace(field, start, delta, true)
+    fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, _: f32, from_surface: bool) -> Found {
+        let walk = ConeWalk { empty: ConeKind::Cone, relaxed: None, refine: 0, most_steps: self.steps };
+        walk.trace::<false>(field, start, delta, from_surface)
     }
 }

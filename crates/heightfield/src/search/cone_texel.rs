@@ -10,29 +10,17 @@ use super::cone_walk::ConeWalk;
 use crate::{ConeKind, Found, HeightField};
 
 technique! {
-    /// Parameters of [`search`](Search::search) as described above.
+    /// Parameters of [`search`](Search::trace) as described above.
     ConeTexel = "cone_texel", reads ConeTexel, casts_shadows true,
     summary "the same with the published cone map, whose cones cut the surface: to show what that misses",
     source "Dummer 2006",
     parameters { steps: 16384 in 1..=65536, "Most steps; a ray that needs more is unconverged."; }
 }
 
-impl ConeTexel {
-    #[inline(always)]
-    fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, from_surface: bool) -> Found {
-        let walk = ConeWalk { empty: ConeKind::ConeTexel, relaxed: None, refine: 0, most_steps: self.steps };
-        walk.trace::<true>(field, start, delta, from_surface)
-    }
-}
-
 impl Search for ConeTexel {
     #[inline(always)]
-    fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
-        self.trace(field, start, delta, false)
-    }
-
-    #[inline(always)]
-    fn leave(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
-        self.trace(field, start, delta, true)
+    fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, _: f32, from_surface: bool) -> Found {
+        let walk = ConeWalk { empty: ConeKind::ConeTexel, relaxed: None, refine: 0, most_steps: self.steps };
+        walk.trace::<true>(field, start, delta, from_surface)
     }
 }

@@ -13,7 +13,7 @@ use super::cell_walk::{CellWalk, NOTHING, Patch};
 use crate::{DistanceMap, Found, HeightField};
 
 technique! {
-    /// Parameters of [`search`](Search::search) as described above.
+    /// Parameters of [`search`](Search::trace) as described above.
     Distance = "distance", reads Distance, casts_shadows true,
     summary "steps as far as a ball is empty, closed-form cells near the surface: misses nothing",
     source "Donnelly 2005",
@@ -36,9 +36,9 @@ fn distance(field: &HeightField, map: &DistanceMap, patch: &Patch, z: f32) -> f3
     map.distance(texel(0, w), texel(1, h), slice)
 }
 
-impl Distance {
+impl Search for Distance {
     #[inline(always)]
-    fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, from_surface: bool) -> Found {
+    fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, _: f32, from_surface: bool) -> Found {
         let Some(map) = field.distance_map() else { return NOTHING };
         let Some(mut ray) = CellWalk::new(field, start, delta, from_surface) else { return NOTHING };
         // A standing ray is taken to be slow enough for any distance to be a whole step.
@@ -60,17 +60,5 @@ impl Distance {
             }
         }
         ray.unconverged(self.steps)
-    }
-}
-
-impl Search for Distance {
-    #[inline(always)]
-    fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
-        self.trace(field, start, delta, false)
-    }
-
-    #[inline(always)]
-    fn leave(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
-        self.trace(field, start, delta, true)
     }
 }

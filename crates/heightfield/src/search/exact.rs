@@ -335,9 +335,9 @@ pub fn cell_position(field: &HeightField, u: f64, v: f64) -> [f64; 2] {
     [u * field.width() as f64 - 0.5 - first, v * field.height() as f64 - 0.5 - first]
 }
 
-impl Exact {
+impl Search for Exact {
     #[inline(always)]
-    fn trace_f32(field: &HeightField, start: Vec3, delta: Vec3, from_surface: bool) -> Found {
+    fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, _: f32, from_surface: bool) -> Found {
         let first = field.first_texel() as f32;
         let (w, h) = (field.width() as f32, field.height() as f32);
         let ray = CellRay {
@@ -347,18 +347,6 @@ impl Exact {
         };
         let hit = trace(field, field.pyramid(), &ray, MAX_STEPS_F32);
         Found { tau: hit.t, status: hit.status, steps: hit.steps }
-    }
-}
-
-impl Search for Exact {
-    #[inline(always)]
-    fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
-        Self::trace_f32(field, start, delta, false)
-    }
-
-    #[inline(always)]
-    fn leave(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
-        Self::trace_f32(field, start, delta, true)
     }
 
     #[inline(always)]

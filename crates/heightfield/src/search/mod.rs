@@ -12,21 +12,29 @@ use crate::{Found, HeightField, Status};
 pub trait Search: Sized {
     /// Searches the segment from `start` to `start + delta` (texture space).
     ///
-    /// `cos_theta` is the cosine between ray and normal in mesh units.
-    fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, cos_theta: f32) -> Found;
+    /// `cos_theta` is the cosine between ray and normal in mesh units. With `from_surface` the segment
+    /// starts on the surface, and the start itself is no hit; searches that do not look at the start need
+    /// not know.
+    fn trace(
+        &self,
+        field: &HeightField,
+        start: Vec3,
+        delta: Vec3,
+        cos_theta: f32,
+        from_surface: bool,
+    ) -> Found;
 
-    /// The same for a segment that starts on the surface: the start itself is no hit. Searches that do
-    /// not look at the start have nothing to add.
+    /// [`Search::trace`] for a segment that starts anywhere.
     #[inline(always)]
-    fn leave(&self, field: &HeightField, start: Vec3, delta: Vec3, cos_theta: f32) -> Found {
-        self.search(field, start, delta, cos_theta)
+    fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, cos_theta: f32) -> Found {
+        self.trace(field, start, delta, cos_theta, false)
     }
 
     /// Whether a segment that starts on the surface and goes up is blocked. What lies beyond its end, the
     /// light, throws no shadow.
     #[inline(always)]
     fn occluded(&self, field: &HeightField, start: Vec3, delta: Vec3, cos_theta: f32) -> bool {
-        let found = self.leave(field, start, delta, cos_theta);
+        let found = self.trace(field, start, delta, cos_theta, true);
         found.status == Status::Hit && found.tau <= 1.0
     }
 

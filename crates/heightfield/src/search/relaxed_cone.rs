@@ -13,16 +13,16 @@ use super::cone_walk::ConeWalk;
 use crate::{ConeKind, Found, HeightField};
 
 technique! {
-    /// Parameters of [`search`](Search::search) as described above.
+    /// Parameters of [`search`](Search::trace) as described above.
     RelaxedCone = "relaxed_cone", reads RelaxedCone, casts_shadows true,
     summary "steps through cones that a ray pierces at most once, then halves: misses nothing",
     source "Policarpo and Oliveira 2007; Ban, Valasek, Balint and Vad 2024",
     parameters { steps: 16384 in 1..=65536, "Most steps; a ray that needs more is unconverged."; refine: 12 in 0..=32, "Halvings of a jump that ends below the surface, before it is followed cell by cell."; }
 }
 
-impl RelaxedCone {
+impl Search for RelaxedCone {
     #[inline(always)]
-    fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, from_surface: bool) -> Found {
+    fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, _: f32, from_surface: bool) -> Found {
         let walk = ConeWalk {
             empty: ConeKind::Cone,
             relaxed: Some(ConeKind::RelaxedCone),
@@ -30,17 +30,5 @@ impl RelaxedCone {
             most_steps: self.steps,
         };
         walk.trace::<false>(field, start, delta, from_surface)
-    }
-}
-
-impl Search for RelaxedCone {
-    #[inline(always)]
-    fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
-        self.trace(field, start, delta, false)
-    }
-
-    #[inline(always)]
-    fn leave(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
-        self.trace(field, start, delta, true)
     }
 }

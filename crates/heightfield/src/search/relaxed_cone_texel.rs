@@ -12,16 +12,16 @@ use super::cone_walk::ConeWalk;
 use crate::{ConeKind, Found, HeightField};
 
 technique! {
-    /// Parameters of [`search`](Search::search) as described above.
+    /// Parameters of [`search`](Search::trace) as described above.
     RelaxedConeTexel = "relaxed_cone_texel", reads RelaxedConeTexel, casts_shadows true,
     summary "the same with the published maps, pierced more than once: to show what that misses",
     source "Policarpo and Oliveira 2007",
     parameters { steps: 16384 in 1..=65536, "Most steps; a ray that needs more is unconverged."; refine: 12 in 0..=32, "Halvings of a jump that ends below the surface, before it is followed cell by cell."; }
 }
 
-impl RelaxedConeTexel {
+impl Search for RelaxedConeTexel {
     #[inline(always)]
-    fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, from_surface: bool) -> Found {
+    fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, _: f32, from_surface: bool) -> Found {
         let walk = ConeWalk {
             empty: ConeKind::ConeTexel,
             relaxed: Some(ConeKind::RelaxedConeTexel),
@@ -29,17 +29,5 @@ impl RelaxedConeTexel {
             most_steps: self.steps,
         };
         walk.trace::<true>(field, start, delta, from_surface)
-    }
-}
-
-impl Search for RelaxedConeTexel {
-    #[inline(always)]
-    fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
-        self.trace(field, start, delta, false)
-    }
-
-    #[inline(always)]
-    fn leave(&self, field: &HeightField, start: Vec3, delta: Vec3, _cos_theta: f32) -> Found {
-        self.trace(field, start, delta, true)
     }
 }

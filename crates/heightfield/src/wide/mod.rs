@@ -57,9 +57,9 @@ pub struct Findings<L: Lanes> {
     pub steps: L::I,
 }
 
-/// A search over any number of segments at once.
+/// A search over any number of segments at once, which does not look at their starts.
 pub trait WideSearch: Copy {
-    /// As [`Search::search`]. Lanes are independent of each other.
+    /// As [`Search::trace`]. Lanes are independent of each other.
     fn search<L: Lanes>(&self, heights: &Heights<'_, L>, rays: &Segments<L>) -> Findings<L>;
 
     /// As [`Search::occluded`].
@@ -68,7 +68,7 @@ pub trait WideSearch: Copy {
 
 impl<S: WideSearch> Search for S {
     #[inline(always)]
-    fn search(&self, field: &HeightField, start: Vec3, delta: Vec3, cos_theta: f32) -> Found {
+    fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, cos_theta: f32, _: bool) -> Found {
         type One = Portable<1>;
         let rays = Segments::one(start, delta, cos_theta);
         let found = WideSearch::search::<One>(self, &Heights::new(field), &rays);
