@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from ._map_info import MAPS
 from ._stress_cases import WRAPS
+from ._stress_rows import Check, failed, row
 from .errors import BumpWarning
 from .heightmap import HeightMap
 
 __all__ = ["bake_checks", "cones"]
 
 Bake = Callable[..., Any]
-Check = dict[str, Any]
 Heights = NDArray[np.float64]
 
 #: Maps whose values a shift of a repeating map moves along and does not change.
@@ -50,7 +50,7 @@ def bake_checks(
             try:
                 made = _bake(bake, source, name)
             except Exception as error:  # a fault in what is tested must become a line in the table
-                yield label, _failed("runs", f"{type(error).__name__}: {error}")
+                yield label, failed("runs", f"{type(error).__name__}: {error}")
                 continue
             for check in _of_one(bake, name, source, made):
                 yield label, check
@@ -301,22 +301,4 @@ def _check(
             at = np.unravel_index(int(array.argmax()), array.shape)
             level = f"level {number}, " if len(values) > 1 else ""
             worst, where = value, level + f"at {tuple(int(part) for part in at)}"
-    return {
-        "check": name,
-        "worst": worst,
-        "unit": unit,
-        "limit": limit,
-        "passed": worst <= limit,
-        "where": where,
-    }
-
-
-def _failed(name: str, what: str) -> Check:
-    return {
-        "check": name,
-        "worst": float("inf"),
-        "unit": "errors",
-        "limit": 0.0,
-        "passed": False,
-        "where": what,
-    }
+    return row(name, worst, unit, limit, where)

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ._stress_rows import Check, row
 from .errors import BumpWarning
 
 __all__ = ["frame_cases", "frame_checks"]
 
-Check = dict[str, Any]
 Case = tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]
 
 
@@ -103,11 +103,4 @@ def _row(name: str, values: NDArray[np.float64], unit: str, limit: float, where:
     at = int(values.argmax())
     worst = float(values[at])
     place = f"vertex {at}" if where is None and worst > 0.0 else (where or "")
-    return {
-        "check": name,
-        "worst": worst,
-        "unit": unit,
-        "limit": limit,
-        "passed": worst <= limit,
-        "where": place,
-    }
+    return row(name, worst, unit, limit, place)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from . import _bumpwgpu
 from ._stress_cases import RayCase
+from ._stress_rows import Check, failed, row
 from .errors import BumpWarning
 from .heightmap import HeightMap
 from .techniques import Technique
@@ -32,7 +33,6 @@ MOST_TEXELS = {"cpu": 1 << 20, "gpu": 1 << 15}
 MOST_CHANGED = 0.02
 
 March = Callable[..., Any]
-Check = dict[str, Any]
 
 
 def march_checks(march: March, technique: Technique, case: RayCase, device: str) -> Iterator[Check]:
@@ -40,7 +40,7 @@ def march_checks(march: March, technique: Technique, case: RayCase, device: str)
     try:
         hits = _run(march, technique, case.height_map, case.origins, case.directions, case.dtype, device)
     except Exception as error:  # a fault in what is tested must become a line in the table
-        yield _failed("runs", f"{type(error).__name__}: {error}")
+        yield failed("runs", f"{type(error).__name__}: {error}")
         return
     t, status, z = (np.asarray(getattr(hits, name), np.float64) for name in ("t", "status", "z"))
     guaranteed = technique.name in GUARANTEED
@@ -176,7 +176,7 @@ def _same(
     try:
         other = _run(march, technique, height_map, start, along, np.float64, device)
     except Exception as error:  # as above
-        return _failed(name, f"{type(error).__name__}: {error}")
+        return failed(name, f"{type(error).__name__}: {error}")
     again = np.asarray(other.t, np.float64)
     rows, columns = case.height_map.shape
     run = np.hypot(along[:, 0] * columns, along[:, 1] * rows) + np.abs(along[:, 2])
@@ -200,22 +200,4 @@ def _worst(case: RayCase, name: str, values: NDArray[np.float64], unit: str, lim
         place = ", ".join(f"{part:.9g}" for part in origin)
         way = ", ".join(f"{part:.9g}" for part in direction)
         where = f"ray {at}: ({place}) + t ({way})"
-    return {
-        "check": name,
-        "worst": worst,
-        "unit": unit,
-        "limit": limit,
-        "passed": worst <= limit,
-        "where": where,
-    }
-
-
-def _failed(name: str, what: str) -> Check:
-    return {
-        "check": name,
-        "worst": float("inf"),
-        "unit": "errors",
-        "limit": 0.0,
-        "passed": False,
-        "where": what,
-    }
+    return row(name, worst, unit, limit, where)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import itertools
 import json
 import os
@@ -20,6 +18,7 @@ from . import _bumpwgpu
 from . import techniques as _techniques
 from ._atomic import replace_file
 from ._checks import choice, flag, number, whole
+from ._csv import csv_bytes
 from .heightmap import HeightMap
 from .meshes import Mesh
 from .recommending import LEAST_CHECKED, MipAdvice, Recommendation, recommend, recommend_by_mip
@@ -447,13 +446,7 @@ class CompareResult:
         FileNotFoundError
             The folder does not exist.
         """
-        flat = [_flat(row) for row in self.rows]
-        columns = list(dict.fromkeys(name for row in flat for name in row))
-        buffer = io.StringIO()
-        writer = csv.DictWriter(buffer, columns, restval="", lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(flat)
-        return replace_file(path, buffer.getvalue().encode())
+        return replace_file(path, csv_bytes([_flat(row) for row in self.rows]))
 
     def plot(self, path: str | os.PathLike[str]) -> Path:
         """Plot time against error, one panel for each elevation. Needs matplotlib.

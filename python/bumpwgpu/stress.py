@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
 import os
@@ -17,6 +15,7 @@ import numpy as np
 from . import techniques as _techniques
 from ._atomic import replace_file
 from ._checks import choice, whole
+from ._csv import csv_bytes
 from ._map_info import MAPS
 from ._stress_bake import bake_checks
 from ._stress_cases import hard_maps, ray_cases
@@ -124,12 +123,7 @@ class StressResult:
         FileNotFoundError
             The folder does not exist.
         """
-        columns = list(dict.fromkeys(name for row in self.rows for name in row))
-        buffer = io.StringIO()
-        writer = csv.DictWriter(buffer, columns, restval="", lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(self.rows)
-        return replace_file(path, buffer.getvalue().encode())
+        return replace_file(path, csv_bytes(self.rows))
 
     def plot(self, path: str | os.PathLike[str]) -> Path:
         """Plot the searches' error against the view angle and against the distance from the origin.
