@@ -160,7 +160,7 @@ def test_exact_pixels_are_march_results() -> None:
 @pytest.mark.gpu
 @pytest.mark.parametrize("technique", ["cone", "relaxed_cone", "distance"])
 def test_searches_that_read_maps_draw_about_as_fast_as_exact(technique: str) -> None:
-    # Small triangles: half of what is drawn serves its neighbours' derivatives only; that must not be marched.
+    # Small triangles: half of what is drawn only serves derivatives of neighbours, and is not to be marched.
     mesh, material = bw.Mesh.torus(), bricks()
     camera = bw.Camera((1.2, 0.9, 1.2), (0.0, 0.0, 0.0))
 
