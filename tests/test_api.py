@@ -20,7 +20,7 @@ import pytest
 import bumpwgpu as bw
 from bumpwgpu import _bumpwgpu, techniques
 from bumpwgpu.baking import MAPS
-from bumpwgpu.rendering import AOVS
+from bumpwgpu.rendering import AOVS, SKIPS
 
 PACKAGE = Path(bw.__file__).parent
 MODULES = sorted(
@@ -41,6 +41,7 @@ SIGNATURES = {
     ),
     "Maps.save": "self folder * format bits prefix",
     "HorizonShadows": "azimuths softness",
+    "Instance": "mesh material world_from_object",
     "Maps.open": "folder * prefix",
     "Mesh": "positions indices uvs * normals tangents",
     "Mesh.open": "path",
@@ -51,7 +52,7 @@ SIGNATURES = {
     "Light.point": "position color intensity",
     "Material": "height albedo normal * specular shininess normal_convention double_sided",
     "render": (
-        "mesh material * camera lights technique size shadows silhouettes aovs device ambient background"
+        "mesh material * camera lights technique size shadows silhouettes aovs skip device ambient background"
     ),
     "compare": "source techniques * elevations formats device rays repeats seed progress",
     "dequantise": "source * bits progress **options",
@@ -211,6 +212,7 @@ def test_technique_objects() -> None:
 def test_names_agree_with_the_core() -> None:
     assert [entry["name"] for entry in _bumpwgpu.map_registry()] == list(MAPS)
     assert tuple(_bumpwgpu.aov_names()) == AOVS
+    assert tuple(_bumpwgpu.skip_names()) == SKIPS
 
 
 def python(code: str) -> str:

@@ -18,6 +18,7 @@ from .engines import EngineSettings
 from .errors import BakeError, BumpError, BumpWarning, CompareError, MeshError, RenderError
 from .frames import Tangents, tangents
 from .heightmap import HeightMap
+from .instances import Instance
 from .lint import Finding, LintReport, lint
 from .maps import Maps
 from .marching import Hits, march
@@ -60,6 +61,7 @@ __all__ = [
     "HeightMap",
     "Hits",
     "HorizonShadows",
+    "Instance",
     "IntegratedHeights",
     "Light",
     "LintReport",

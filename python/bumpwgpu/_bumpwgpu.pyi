@@ -66,6 +66,7 @@ __all__ = [
     "save_map",
     "seams",
     "simd_level",
+    "skip_names",
     "surface_points",
     "tangent_methods",
     "tangents",
@@ -313,7 +314,7 @@ def march_gpu(
 def quantum(heights: NDArray[np.float32]) -> float | None: ...
 def read_image(path: _Path) -> _Decoded: ...
 def render(
-    draws: Sequence[tuple[Mesh, int, int, Material]],
+    draws: Sequence[tuple[Mesh, int, int, Material, Sequence[float]]],
     camera: tuple[_Vector, _Vector, _Vector, float],
     lights: Sequence[tuple[bool, _Vector, _Vector, float]],
     ambient: _Vector,
@@ -325,6 +326,7 @@ def render(
     horizon: tuple[int, float] | None,
     silhouettes: bool,
     aovs: Sequence[str],
+    skips: Sequence[str],
 ) -> _RenderResult: ...
 def save_map(
     map: str,
@@ -337,6 +339,7 @@ def save_map(
 ) -> tuple[list[tuple[Path, int, int, str | None]], list[tuple[float, float]]]: ...
 def seams(field: Field) -> list[dict[str, Any]]: ...
 def simd_level() -> str: ...
+def skip_names() -> list[str]: ...
 def surface_points(
     shape: str, radii: tuple[float, float], uv: NDArray[np.float64]
 ) -> list[NDArray[np.float64]]: ...

@@ -17,6 +17,7 @@ from . import _bumpwgpu
 from ._atomic import replace_file
 from ._checks import choice, flag, number, numbers, strings, whole, width_and_height
 from .errors import BumpWarning, RenderError
+from .instances import Instance, framing, instances_of
 from .meshes import Mesh
 from .scene import Camera, Light, Material
 from .techniques import Technique, get
@@ -24,7 +25,7 @@ from .techniques import Technique, get
 if TYPE_CHECKING:
     from PIL import Image
 
-__all__ = ["AOVS", "Frame", "HorizonShadows", "render"]
+__all__ = ["AOVS", "SKIPS", "Frame", "HorizonShadows", "render"]
 
 #: Additional outputs.
 AOVS: tuple[str, ...] = (
@@ -38,6 +39,18 @@ AOVS: tuple[str, ...] = (
     "mask",
     "ray_start",
     "ray_delta",
+)
+#: Kinds of work that a picture may not need.
+SKIPS: tuple[str, ...] = (
+    "frustum",
+    "backface",
+    "occlusion",
+    "depth_first",
+    "flat",
+    "parallax",
+    "range",
+    "level",
+    "shadow",
 )
 #: Longest side of a picture, in pixels.
 MAX_SIDE = 1 << 16
@@ -90,7 +103,8 @@ class Frame:
         Times in milliseconds (``prepare_ms``, ``compile_ms``, ``draw_ms``, ``readback_ms``,
         ``total_ms``), ``triangles_drawn``, ``triangles_culled``, ``pixels_covered``,
         ``pixels_marched``, ``pixels_skipped``, ``pixels_unconverged``, ``steps``, ``shadow_rays``,
-        ``maps_baked``, and whether ``draw_ms`` is from the device's own clock.
+        ``maps_baked``, ``skipped`` (see `skip` of :func:`render`), and whether ``draw_ms`` is from the
+        device's own clock.
     warnings : tuple of str
         Settings that could not take effect; also given as Python warnings.
     """
@@ -192,7 +206,7 @@ class Frame:
 
 
 def render(
-    mesh: Mesh,
+    mesh: Mesh | Instance | Iterable[Mesh | Instance],
     material: Material | Sequence[Material] | None = None,
     *,
     camera: Camera | None = None,
@@ -202,20 +216,22 @@ def render(
     shadows: bool | Literal["horizon"] | HorizonShadows | None = None,
     silhouettes: bool = False,
     aovs: str | Iterable[str] = (),
+    skip: bool | str | Iterable[str] = True,
     device: str = "auto",
     ambient: float | tuple[float, float, float] = 0.1,
     background: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0),
 ) -> Frame:
-    """Draw a mesh with a relief.
+    """Draw meshes with relief.
 
     Parameters
     ----------
-    mesh : Mesh
-        What to draw.
+    mesh : Mesh, Instance, or iterable of them
+        What to draw: a mesh where it is, or a whole scene of instances, each with its place and materials.
     material : Material, sequence of Material or None
-        One for the whole mesh, or one for each of ``mesh.materials``, or None for the mesh file's own.
+        For a single mesh: one for the whole of it, or one for each of ``mesh.materials``, or None for the
+        mesh file's own. Instances bring their own.
     camera : Camera or None
-        None looks at the whole mesh from the front, a little from above.
+        None looks at everything from the front, a little from above.
     lights : iterable of Light or None
         None is one directional light from the upper right.
     technique : str or Technique, default "relief"
@@ -233,9 +249,17 @@ def render(
         shell. For ``technique="exact"``; on the others it has no effect, and a warning says so.
     aovs : str or iterable of str
         Additional outputs, (H, W) or (H, W, C): "uv" (unwrapped), "depth" (along the view axis, mesh
-        units, inf where nothing is), "position", "normal" (world axes), "height" (0..1), "steps",
+        units, inf where nothing is), "position" (float32 as the others: half a
+        millimetre off at 10 km where lengths are metres), "normal" (world axes), "height" (0..1), "steps",
         "shadow" (share of the lights that the relief hides), "mask" (1 where there is anything),
         "ray_start" and "ray_delta" (the segment searched, texture space).
+    skip : bool or iterable of str, default True
+        What to leave out where the picture does not need it: all of it, nothing, or some of
+        :data:`bumpwgpu.rendering.SKIPS`. ``frame.stats["skipped"]`` counts what was left out: triangles
+        outside the picture ("frustum"), facing away ("backface") and hidden ("occlusion"), fragments
+        behind others ("depth_first"); pixels on flat ground ("flat"), with no visible parallax
+        ("parallax"), marched over less of their ray ("range") or a coarser map ("level"); shadow rays
+        that hide no light ("shadow").
     device : {"auto", "gpu"}
         Both render on the Vulkan device; the environment variable ``BUMPWGPU_ADAPTER`` picks one by
         a part of its name.
@@ -269,8 +293,7 @@ def render(
     >>> bw.render(bw.Mesh.quad(), wall, size=(32, 16)).color.shape  # doctest: +GPU
     (16, 32, 4)
     """
-    if not isinstance(mesh, Mesh):
-        raise TypeError(f"mesh must be a Mesh, got {type(mesh).__name__}")
+    instances = instances_of(mesh, material)
     chosen = get(technique)
     choice("device", device, ("auto", "gpu", "cpu"))
     if device == "cpu":
@@ -280,12 +303,16 @@ def render(
     outputs = strings("aovs", aovs, AOVS)
     width, height = _size(size)
     if camera is None:
-        camera = _front(mesh, width / height)
+        camera = framing(instances, width / height)
     elif not isinstance(camera, Camera):
         raise TypeError(f"camera must be a Camera, got {type(camera).__name__}")
-    draws = _draws(mesh, material)
+    draws = [
+        (part.mesh._core, first, end, used._core, part.world_from_object.T.ravel().tolist())
+        for part in instances
+        for first, end, used in part._draws
+    ]
     result = _bumpwgpu.render(
-        [(mesh._core, first, end, used._core) for first, end, used in draws],
+        draws,
         (camera.eye, camera.target, camera.up, camera.fov_y),
         [(lamp.kind == "directional", lamp.vector, lamp.color, lamp.intensity) for lamp in _lights(lights)],
         _ambient(ambient),
@@ -296,9 +323,11 @@ def render(
         *_shadows(shadows),
         flag("silhouettes", silhouettes),
         outputs,
+        _skips(skip),
     )
     texts = list(result["warnings"])
-    if chosen.name != "flat" and all(used.height is None and used.normal is None for *_, used in draws):
+    used = {used for part in instances for *_, used in part._draws}
+    if chosen.name != "flat" and all(one.height is None and one.normal is None for one in used):
         texts.append(f"technique {chosen.name!r} has no effect: the material has no height map")
     for text in texts:
         warnings.warn(text, BumpWarning, stacklevel=2)
@@ -321,6 +350,12 @@ def _shadows(shadows: Any) -> tuple[bool | None, tuple[int, float] | None]:
         ) from None
 
 
+def _skips(skip: Any) -> list[str]:
+    if isinstance(skip, bool | np.bool_):
+        return list(SKIPS) if skip else []
+    return strings("skip", skip, SKIPS)
+
+
 def _size(size: Any) -> tuple[int, int]:
     width, height = width_and_height(size)
     if width < 1 or height < 1:
@@ -328,44 +363,6 @@ def _size(size: Any) -> tuple[int, int]:
     if width > MAX_SIDE or height > MAX_SIDE:
         raise RenderError(f"size is {width} x {height}; each side may be at most {MAX_SIDE}")
     return width, height
-
-
-def _draws(mesh: Mesh, material: Any) -> list[tuple[int, int, Material]]:
-    """Runs of triangles with their material."""
-    triangles = len(mesh.indices)
-    if isinstance(material, Material):
-        return [(0, triangles, material)]
-    if material is None:
-        loaded = mesh.load_materials()
-    elif isinstance(material, Sequence) and all(isinstance(part, Material) for part in material):
-        loaded = list(material)
-        if len(loaded) != len(mesh.materials):
-            raise ValueError(f"{len(loaded)} materials given, but the mesh has {len(mesh.materials)}")
-    else:
-        raise TypeError(
-            f"material must be a Material, a sequence of them or None, got {type(material).__name__}"
-        )
-    plain = Material()
-    return [
-        (
-            part.triangles.start,
-            part.triangles.stop,
-            loaded[part.material] if part.material is not None else plain,
-        )
-        for part in mesh.parts
-    ]
-
-
-def _front(mesh: Mesh, aspect: float) -> Camera:
-    """A camera that sees the whole mesh from the front, a little from above."""
-    centre = np.mean(np.array(mesh.bounds, np.float64), axis=0)
-    radius = max(float(np.linalg.norm(mesh.positions - centre, axis=1).max()), 1e-6)
-    fov_y = 40.0
-    half = np.radians(fov_y / 2.0)
-    narrow = min(half, np.arctan(np.tan(half) * aspect))
-    way = np.array([0.35, 0.45, 1.0])
-    eye = centre + way / np.linalg.norm(way) * (radius / np.sin(narrow) * 1.02)
-    return Camera.look_at(eye, centre, fov_y=fov_y)
 
 
 def _lights(lights: Any) -> list[Light]:

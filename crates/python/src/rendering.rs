@@ -3,13 +3,13 @@
 use std::sync::Arc;
 
 use bake::{Image, Samples};
-use glam::{DVec3, Vec3};
+use glam::{DMat4, DVec3, Vec3};
 use heightfield::OutputSet;
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use render::{AovSet, Camera, Draw, HorizonShadows, Light, Request, Scene, TechniqueChoice};
+use render::{AovSet, Camera, Draw, HorizonShadows, Light, Request, Scene, Skips, TechniqueChoice};
 
 use crate::errors::Raise;
 use crate::field::Field;
@@ -80,13 +80,23 @@ fn parse_light((directional, vector, color, intensity): LightArg) -> Light {
     }
 }
 
-/// Renders runs of triangles `(mesh, first, end, material)` into a dict with `color`, `aovs`,
-/// `stats` and `warnings`. `horizon`: azimuths and softness (radians) of shadows from a horizon map.
+/// `(mesh, first triangle, end, material, world_from_object by columns)`.
+type DrawArg<'py> = (Bound<'py, PyMesh>, u32, u32, Bound<'py, PyMaterial>, [f64; 16]);
+
+fn parse_draw((mesh, first, end, material, world_from_object): &DrawArg<'_>) -> Draw<'static> {
+    Draw {
+        triangles: *first..*end,
+        world_from_object: DMat4::from_cols_array(world_from_object),
+        ..Draw::new(mesh.get().shared(), Arc::clone(&material.get().inner))
+    }
+}
+
+/// Renders runs of triangles into a dict with `color`, `aovs`, `stats` and `warnings`. `horizon`: azimuths and softness (radians) of shadows from a horizon map.
 #[pyfunction(name = "render")]
 #[expect(clippy::too_many_arguments, reason = "one flat call from the Python facade")]
 pub fn render_scene<'py>(
     py: Python<'py>,
-    draws: Vec<(Bound<'py, PyMesh>, u32, u32, Bound<'py, PyMaterial>)>,
+    draws: Vec<DrawArg<'py>>,
     camera: CameraArg,
     lights: Vec<LightArg>,
     ambient: [f32; 3],
@@ -98,6 +108,7 @@ pub fn render_scene<'py>(
     horizon: Option<(u32, f32)>,
     silhouettes: bool,
     aovs: Vec<String>,
+    skips: Vec<String>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let technique = parse_choice(technique, &parameters)?;
     let aovs = aovs.iter().try_fold(AovSet::NONE, |set, name| {
@@ -106,27 +117,20 @@ pub fn render_scene<'py>(
             .map(|aov| set | aov)
             .ok_or_else(|| PyValueError::new_err(format!("unknown output {name:?}; known: {}", known())))
     })?;
-    let draws: Vec<_> = draws
-        .iter()
-        .map(|(mesh, first, end, material)| {
-            (mesh.get().shared(), *first..*end, Arc::clone(&material.get().inner))
-        })
-        .collect();
+    let skips = skips.iter().try_fold(Skips::NONE, |set, name| {
+        Skips::named(name)
+            .map(|skip| set | skip)
+            .ok_or_else(|| PyValueError::new_err(format!("unknown kind of work to skip {name:?}")))
+    })?;
+    let draws: Vec<_> = draws.iter().map(parse_draw).collect();
     let (eye, target, up, fov_y) = camera;
     let frame = run(py, None, |task| {
         let device = render::device()?;
         if let TechniqueChoice::Search(technique) = &technique {
-            for (_, _, material) in &draws {
-                provide(task, &material.field, technique.info.reads)?;
+            for draw in &draws {
+                provide(task, &draw.material.field, technique.info.reads)?;
             }
         }
-        let draws = draws
-            .iter()
-            .map(|(mesh, triangles, material)| Draw {
-                triangles: triangles.clone(),
-                ..Draw::new(mesh, material)
-            })
-            .collect();
         let scene = Scene {
             draws,
             camera: Camera {
@@ -140,8 +144,8 @@ pub fn render_scene<'py>(
             background,
         };
         let horizon = horizon.map(|(azimuths, softness)| HorizonShadows { azimuths, softness });
-        let request =
-            Request { shadows, horizon, silhouettes, aovs, ..Request::new(technique, size[0], size[1]) };
+        let plain = Request::new(technique, size[0], size[1]);
+        let request = Request { shadows, horizon, silhouettes, aovs, skips, ..plain };
         render::render(&device, &scene, &request)
     })?;
     frame_to_dict(py, frame)
@@ -189,6 +193,11 @@ fn frame_to_dict(py: Python<'_>, frame: render::Frame) -> PyResult<Bound<'_, PyD
     stats.set_item("pixels_unconverged", s.pixels_unconverged)?;
     stats.set_item("steps", s.steps)?;
     stats.set_item("shadow_rays", s.shadow_rays)?;
+    let skipped = PyDict::new(py);
+    for (name, count) in s.skipped.iter() {
+        skipped.set_item(name, count)?;
+    }
+    stats.set_item("skipped", skipped)?;
     let dict = PyDict::new(py);
     dict.set_item("color", PyArray1::from_vec(py, frame.color).reshape([height, width, 4])?)?;
     dict.set_item("aovs", aovs)?;
@@ -201,6 +210,12 @@ fn frame_to_dict(py: Python<'_>, frame: render::Frame) -> PyResult<Bound<'_, PyD
 #[pyfunction]
 pub fn aov_names() -> Vec<&'static str> {
     AovSet::NAMED.map(|(name, _)| name).to_vec()
+}
+
+/// Names of the kinds of work that a rendering may leave out.
+#[pyfunction]
+pub fn skip_names() -> Vec<&'static str> {
+    Skips::NAMED.map(|(name, _)| name).to_vec()
 }
 
 /// Marches on the device: the outputs, and the seconds it took there.

@@ -1,5 +1,7 @@
 //! What a rendering returns.
 
+use crate::Skipped;
+
 /// Additional outputs; `None` where not asked for. Rows from the top.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Aovs {
@@ -58,6 +60,8 @@ pub struct Stats {
     pub steps: u64,
     /// Shadow rays of the pixels seen.
     pub shadow_rays: u64,
+    /// What was left out.
+    pub skipped: Skipped,
 }
 
 /// A picture and what came with it.

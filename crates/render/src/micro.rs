@@ -83,9 +83,9 @@ pub(crate) fn displaced(
             limit: MOST,
         };
         let made = if only_bridges {
-            mesh::bridges(draw.mesh, &cut, &relief)
+            mesh::bridges(&draw.mesh, &cut, &relief)
         } else {
-            mesh::displace(draw.mesh, &cut, &relief)
+            mesh::displace(&draw.mesh, &cut, &relief)
         };
         match made {
             Ok(displaced) => return Ok((displaced, coarser)),

@@ -20,7 +20,7 @@ use crate::triangles::Triangles;
 use crate::uniforms::{DrawInfo, HorizonInfo, LightInfo, MaterialInfo, wrap_code};
 use crate::uploads::{Kind, Resource};
 use crate::{
-    Device, Draw, HorizonShadows, Light, Material, RenderError, Request, Scene, Stats, TechniqueChoice,
+    Device, Draw, HorizonShadows, Light, Material, RenderError, Request, Scene, Skips, Stats, TechniqueChoice,
 };
 
 /// One draw, ready.
@@ -58,14 +58,17 @@ pub(crate) fn draws(
     let mut meshes = Meshes::new();
     let mut prepared = Vec::new();
     for (index, draw) in scene.draws.iter().enumerate() {
-        let middle = centre(draw.mesh);
+        let middle = centre(&draw.mesh);
         let relative_from_object = DMat4::from_translation(-scene.camera.eye)
-            * draw.world_from_object.as_dmat4()
+            * draw.world_from_object
             * DMat4::from_translation(middle);
         let count = u64::from(draw.triangles.end - draw.triangles.start);
         let (ball_centre, radius) = ball(draw, relative_from_object);
-        if count == 0 || scene.camera.misses_ball(aspect, ball_centre, radius) {
+        let unseen =
+            request.skips.contains(Skips::FRUSTUM) && scene.camera.misses_ball(aspect, ball_centre, radius);
+        if count == 0 || unseen {
             stats.triangles_culled += count;
+            stats.skipped.add(Skips::FRUSTUM, count);
             continue;
         }
         let view = View { camera: &scene.camera, relative_from_object, centre: middle, size };
@@ -89,7 +92,7 @@ pub(crate) fn draws(
         let draw_group = draw_group(device, draw, &view, shell.as_ref())?;
         for Part { program, geometry, triangles } in parts {
             stats.triangles_drawn += u64::from(triangles.end - triangles.start);
-            let material = material_group(device, draw.material, program, request.horizon, stats)?;
+            let material = material_group(device, &draw.material, program, request.horizon, stats)?;
             let before = Instant::now();
             let pipeline = device.pipeline(key(draw, request, program, shadows))?;
             stats.compile_ms += before.elapsed().as_secs_f64() * 1e3;
@@ -137,11 +140,11 @@ fn parts(
     program.horizon =
         request.horizon.is_some() && request.shadows != Some(false) && request.technique.takes_horizon();
     let locations = attributes(program.entry);
-    let known = (std::ptr::from_ref(draw.mesh), locations);
+    let known = (std::ptr::from_ref::<Mesh>(&draw.mesh), locations);
     let geometry = match meshes.get(&known) {
         Some(geometry) => Arc::clone(geometry),
         None => {
-            let geometry = Arc::new(Geometry::new(device, draw.mesh, view.centre, locations)?);
+            let geometry = Arc::new(Geometry::new(device, &draw.mesh, view.centre, locations)?);
             meshes.insert(known, Arc::clone(&geometry));
             geometry
         }
@@ -188,7 +191,7 @@ fn draw_group(
     };
     let buffer = device.buffer_with("draw", bytemuck::bytes_of(&info), wgpu::BufferUsages::STORAGE)?;
     let mut entries = vec![bind(0, buffer.as_entire_binding())];
-    let triangles = shell.map(|_| Triangles::new(device, draw.mesh, view.centre)).transpose()?;
+    let triangles = shell.map(|_| Triangles::new(device, &draw.mesh, view.centre)).transpose()?;
     if let (Some(triangles), Some(shell)) = (&triangles, shell) {
         entries.push(bind(1, triangles.vertices.as_entire_binding()));
         entries.push(bind(2, triangles.indices.as_entire_binding()));

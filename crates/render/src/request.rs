@@ -2,9 +2,9 @@
 
 use heightfield::Technique;
 
-use crate::RenderError;
 use crate::layouts::MaterialMaps;
 use crate::plain::{PLAIN_TECHNIQUES, PlainTechnique};
+use crate::{RenderError, Skips};
 
 /// How the relief is shown.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -213,6 +213,8 @@ pub struct Request {
     pub silhouettes: bool,
     /// Additional outputs.
     pub aovs: AovSet,
+    /// What may be left out where the picture does not need it.
+    pub skips: Skips,
 }
 
 impl Request {
@@ -231,6 +233,7 @@ impl Request {
             horizon: None,
             silhouettes: false,
             aovs: AovSet::NONE,
+            skips: Skips::ALL,
         }
     }
 }

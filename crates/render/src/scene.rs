@@ -4,11 +4,11 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use bake::Image;
-use glam::{DVec3, Mat4, Vec3};
+use glam::{DMat4, DVec3, DVec4, Vec3};
 use heightfield::HeightField;
 use mesh::Mesh;
 
-use crate::{Camera, RenderError};
+use crate::{Camera, Held, RenderError};
 
 /// A surface: a height field with its extent, colour and gloss.
 #[derive(Debug, Clone)]
@@ -71,25 +71,28 @@ impl Material {
 /// One mesh, or some of its triangles, in the scene.
 #[derive(Debug, Clone)]
 pub struct Draw<'a> {
-    /// The mesh.
-    pub mesh: &'a Mesh,
+    /// The mesh. Draws of the same mesh are instances: it is uploaded once.
+    pub mesh: Held<'a, Mesh>,
     /// Which of its triangles.
     pub triangles: Range<u32>,
     /// How it looks.
-    pub material: &'a Material,
-    /// Where it stands.
-    pub world_from_object: Mat4,
+    pub material: Held<'a, Material>,
+    /// Where it stands: any affine map with an inverse. Relief is part of the object: it is stretched along with the
+    /// mesh, as the displaced mesh would be.
+    pub world_from_object: DMat4,
 }
 
 impl<'a> Draw<'a> {
     /// A whole mesh where it is.
-    pub fn new(mesh: &'a Mesh, material: &'a Material) -> Self {
-        Self { mesh, triangles: 0..mesh.indices.len() as u32, material, world_from_object: Mat4::IDENTITY }
+    pub fn new(mesh: impl Into<Held<'a, Mesh>>, material: impl Into<Held<'a, Material>>) -> Self {
+        let (mesh, material) = (mesh.into(), material.into());
+        let triangles = 0..mesh.indices.len() as u32;
+        Self { mesh, triangles, material, world_from_object: DMat4::IDENTITY }
     }
 
     pub(crate) fn validate(&self, index: usize) -> Result<(), RenderError> {
         let fail = |problem: String| Err(RenderError::Mesh { index, problem });
-        let mesh = self.mesh;
+        let mesh = &*self.mesh;
         let vertices = mesh.positions.len();
         for (name, length) in [
             ("normals", mesh.normals.len()),
@@ -112,7 +115,7 @@ impl<'a> Draw<'a> {
         if let Some(at) = mesh.positions.iter().position(|position| !position.is_finite()) {
             return fail(format!("vertex {at} is at {}", mesh.positions[at]));
         }
-        let matrix = self.world_from_object.as_dmat4();
+        let matrix = self.world_from_object;
         let determinant = matrix.determinant();
         if !matrix.is_finite()
             || !determinant.is_finite()
@@ -120,6 +123,12 @@ impl<'a> Draw<'a> {
             || !matrix.inverse().is_finite()
         {
             return fail("world_from_object has no inverse".to_owned());
+        }
+        if matrix.row(3) != DVec4::W {
+            return fail(format!(
+                "the last row of world_from_object is {}; it must be 0, 0, 0, 1",
+                matrix.row(3)
+            ));
         }
         Ok(())
     }

@@ -7,7 +7,7 @@ mod common;
 use std::sync::Arc;
 
 use common::{fbm, field, front, mesh_of, sun};
-use glam::{DVec2, DVec3, Mat4, Quat, Vec2, Vec3};
+use glam::{DMat4, DVec2, DVec3, Quat, Vec2, Vec3};
 use heightfield::{Extent, HeightField, Technique, Wrap};
 use mesh::Mesh;
 use render::surface::{self, SurfaceFrame};
@@ -259,7 +259,7 @@ fn far_from_the_origin_nothing_changes() {
     let near = scene(&mesh, &material, front());
     let mut far = near.clone();
     let offset = DVec3::new(16_777_216.0, -8_388_608.0, 4_194_304.0);
-    far.draws[0].world_from_object = Mat4::from_translation(offset.as_vec3());
+    far.draws[0].world_from_object = DMat4::from_translation(offset);
     far.camera.eye += offset;
     far.camera.target += offset;
     let request = all("relief", 96, 96);

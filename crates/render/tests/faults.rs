@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use bake::{Image, Samples};
 use common::{fbm, field, front, sun};
-use glam::{DVec3, Mat4, Vec3};
+use glam::{DMat4, DVec3, Vec3};
 use heightfield::{Extent, Wrap};
 use mesh::Mesh;
 use render::{Device, DeviceOptions, Draw, Light, Material, RenderError, Request, Scene, TechniqueChoice};
@@ -57,9 +57,10 @@ fn senseless_scenes_are_named() {
     check("ambient", &|scene, _| scene.ambient[1] = -1.0);
     check("background", &|scene, _| scene.background[3] = 2.0);
     check("triangles", &|scene, _| scene.draws[0].triangles = 1..9);
-    check("inverse", &|scene, _| scene.draws[0].world_from_object = Mat4::ZERO);
+    check("inverse", &|scene, _| scene.draws[0].world_from_object = DMat4::ZERO);
+    check("last row", &|scene, _| scene.draws[0].world_from_object.x_axis.w = 0.5);
     check("inverse", &|scene, _| {
-        scene.draws[0].world_from_object = Mat4::from_scale(Vec3::new(1.0, f32::NAN, 1.0))
+        scene.draws[0].world_from_object = DMat4::from_scale(DVec3::new(1.0, f64::NAN, 1.0))
     });
 }
 

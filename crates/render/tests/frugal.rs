@@ -57,7 +57,7 @@ fn nothing_is_baked_uploaded_or_compiled_in_vain() {
 
     // Outside the picture nothing is drawn.
     let mut away = scene.clone();
-    away.draws[0].world_from_object = glam::Mat4::from_translation(Vec3::new(50.0, 0.0, 0.0));
+    away.draws[0].world_from_object = glam::DMat4::from_translation(glam::DVec3::new(50.0, 0.0, 0.0));
     let stats = render::render(&device, &away, &request).unwrap().stats;
     assert_eq!((stats.triangles_drawn, stats.triangles_culled, stats.pixels_covered), (0, 2, 0));
 

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use bake::{Image, Samples};
 use common::{fbm, field, front, mesh_of, sun};
-use glam::{DVec3, Mat4, Vec2, Vec3};
+use glam::{DMat4, DVec3, Vec2, Vec3};
 use heightfield::{Extent, Wrap};
 use mesh::Mesh;
 use render::{AovSet, Camera, Draw, Frame, Light, Material, Request, Scene, TechniqueChoice};
@@ -118,7 +118,7 @@ fn mirrored_charts_and_transforms_keep_light_and_relief_in_place() {
         let plain = shot(&device, &scene(&mesh, &material, light), technique);
         let chart = shot(&device, &scene(&mirrored, &material, light), technique);
         let mut turned = scene(&mesh, &material, light);
-        turned.draws[0].world_from_object = Mat4::from_scale(Vec3::new(-1.0, 1.0, 1.0));
+        turned.draws[0].world_from_object = DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0));
         let transform = shot(&device, &turned, technique);
         for (name, frame) in [("chart", chart), ("transform", transform)] {
             // The dome is symmetric, so all pictures are the same but for rounding at its rim.
@@ -187,7 +187,7 @@ fn reliefs_intersect_other_geometry() {
             Draw::new(&mesh, &relief),
             // 0.2 below the mesh: between the two levels of the relief.
             Draw {
-                world_from_object: Mat4::from_translation(Vec3::new(0.0, 0.0, -0.2)),
+                world_from_object: DMat4::from_translation(DVec3::new(0.0, 0.0, -0.2)),
                 ..Draw::new(&mesh, &red)
             },
         ];

@@ -45,7 +45,7 @@ impl Shell {
 }
 
 fn build(draw: &Draw<'_>, centre: DVec3) -> (Vec<ShellNode>, Vec<ShellPrism>) {
-    let (mesh, field) = (draw.mesh, &draw.material.field);
+    let (mesh, field) = (&*draw.mesh, &draw.material.field);
     let extent = field.extent();
     let heights = HeightBounds::new(field);
     let made: Vec<(ShellPrism, Bounds)> = draw
