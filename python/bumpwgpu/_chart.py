@@ -40,7 +40,7 @@ def points(result: Any, elevation: Any) -> list[Point]:
     clock = f"time_{result.timed_on}_ns_per_ray"
     front = {row["label"] for row in result.pareto(elevation)}
     loose = {row["label"] for row in result.pareto(elevation, max_failure_rate=1.0)}
-    from .compare import MAX_FAILURE_RATE
+    from .compare_result import MAX_FAILURE_RATE
 
     return [
         Point(

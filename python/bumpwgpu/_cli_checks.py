@@ -25,8 +25,8 @@ from ._cli_tools import (
 )
 from .baking import MAPS
 from .frames import TANGENT_METHODS
-from .lint import lint as lint_sources
-from .stress import stress as stress_everything
+from .linting import lint as lint_sources
+from .stressing import stress as stress_everything
 
 __all__ = ["lint", "stress"]
 

@@ -14,19 +14,18 @@ from numpy.typing import NDArray
 from . import _bumpwgpu
 from . import techniques as _techniques
 from ._quality import flip, psnr, ssim
+from .compare_result import REGIONS, CompareResult, Picture, Progress, Row, label
 from .errors import BumpWarning, CompareError
 from .rendering import Frame, render
+from .system import machine
 from .techniques import Technique
 
 if TYPE_CHECKING:
-    from .compare import CompareResult, Progress, Row, Scene
+    from .compare_scene import Scene
     from .heightmap import HeightMap
     from .scene import Camera
 
 __all__ = ["compare_scene", "verify_scene"]
-
-#: As in compare.REGIONS.
-REGIONS = ("interior", "silhouette", "shadow")
 
 #: The exact picture must agree with the reference in double precision to this many texels at p99;
 #: measured on a quad, a cube and a torus: 0.002.
@@ -72,8 +71,6 @@ def compare_scene(
     progress: Progress | None,
 ) -> CompareResult:
     """Compare techniques on a scene; see :func:`bumpwgpu.compare`."""
-    from .compare import CompareResult, Picture, label, machine
-
     if device == "cpu":
         raise ValueError("comparing a scene renders it, which needs a Vulkan device: device='auto' or 'gpu'")
     settings = chosen or [_techniques.get(name) for name in _techniques.names()]

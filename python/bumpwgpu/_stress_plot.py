@@ -12,7 +12,7 @@ from ._chart import FLOOR_TEXELS
 from .errors import CompareError
 
 if TYPE_CHECKING:
-    from .stress import StressResult
+    from .stressing import StressResult
 
 __all__ = ["plot"]
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ._chart import FLOOR_TEXELS, Point, axis_range, colors, place_labels, points, short
 
 if TYPE_CHECKING:
-    from .compare import CompareResult
+    from .compare_result import CompareResult
 
 __all__ = ["chart", "legend"]
 

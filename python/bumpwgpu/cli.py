@@ -45,8 +45,10 @@ from ._map_info import OPTIONS, MapOption
 from .baking import MAPS
 from .baking import bake as bake_maps
 from .baking import bake_file as bake_map_file
-from .compare import ELEVATIONS, FORMATS, Scene, advice_dict
-from .compare import compare as compare_techniques
+from .compare_result import FORMATS, advice_dict
+from .compare_scene import Scene
+from .comparing import ELEVATIONS
+from .comparing import compare as compare_techniques
 from .engines import ENGINES
 from .heightmap import HeightMap
 from .mesh_maps import MESH_MAPS, MeshMaps

@@ -13,7 +13,7 @@ from ._chart import FLOOR_TEXELS, axis_range, colors, place_labels, points, shor
 from .errors import CompareError
 
 if TYPE_CHECKING:
-    from .compare import CompareResult
+    from .compare_result import CompareResult
 
 __all__ = ["plot"]
 

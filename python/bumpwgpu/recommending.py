@@ -15,7 +15,7 @@ from .engines import EngineSettings, engine_settings
 from .heightmap import HeightMap
 
 if TYPE_CHECKING:
-    from .compare import CompareResult, Row
+    from .compare_result import CompareResult, Row
     from .techniques import Technique
 
 __all__ = ["MipAdvice", "Recommendation", "recommend", "recommend_by_mip"]
@@ -269,7 +269,7 @@ def recommend_by_mip(
     result: CompareResult, max_error: float, levels: int, progress: Any, options: dict[str, Any]
 ) -> list[MipAdvice]:
     """See :meth:`bumpwgpu.CompareResult.recommend_by_mip`."""
-    from .compare import compare
+    from .comparing import compare
 
     source = result._height_map()
     if source is None or result.kind != "planar":

@@ -20,7 +20,7 @@ from ._atomic import replace_file
 from ._svg import chart, legend
 
 if TYPE_CHECKING:
-    from .compare import CompareResult, Picture, Row
+    from .compare_result import CompareResult, Picture, Row
     from .recommending import Recommendation
 
 __all__ = ["report"]

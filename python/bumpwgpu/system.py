@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from . import _bumpwgpu
 
-__all__ = ["info"]
+__all__ = ["info", "machine"]
 
 
 def info() -> dict[str, Any]:
@@ -43,3 +44,27 @@ def info() -> dict[str, Any]:
         "techniques": list(technique_names()),
         "adapters": adapters,
     }
+
+
+def machine(uses_device: bool) -> dict[str, Any]:
+    """Device and versions, for every comparison to state."""
+    found = info()
+    wanted = os.environ.get("BUMPWGPU_ADAPTER", "").lower()
+    device = next((known for known in found["adapters"] if wanted in known["name"].lower()), None)
+    stated = {"cpu": f"{_processor()}, {found['threads']} threads, {found['simd']}"}
+    if uses_device and device is not None:
+        driver = f"{device['driver']} {device['driver_info']}"
+        stated["device"] = f"{device['name']} ({device['kind']}), driver {driver}"
+    return {**stated, **{key: found[key] for key in ("version", "python", "numpy", "platform")}}
+
+
+def _processor() -> str:
+    """What the processor calls itself, where the system says."""
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as lines:
+            for line in lines:
+                if line.startswith("model name"):
+                    return line.split(":", 1)[1].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()

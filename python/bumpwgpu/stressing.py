@@ -25,6 +25,7 @@ from .baking import bake as bake_maps
 from .frames import TANGENT_METHODS
 from .frames import tangents as find_tangents
 from .marching import march as march_rays
+from .system import machine
 from .techniques import Technique
 
 __all__ = ["StressResult", "stress"]
@@ -283,8 +284,6 @@ def stress(
                 rows.append({**begin, **check, "at": None})
     if progress is not None:
         progress(total, total, "done")
-    from .compare import machine
-
     environment = {
         **machine(device == "gpu"),
         "rays_per_case": count,

@@ -76,7 +76,7 @@ class Finding(NamedTuple):
     Attributes
     ----------
     code : str
-        A key of ``CODES`` in the module ``bumpwgpu.lint``.
+        A key of ``CODES`` in the module ``bumpwgpu.linting``.
     severity : {"error", "warning", "info"}
         "error": it shows; "warning": it may; "info": worth knowing.
     subject : str
@@ -214,7 +214,7 @@ def lint(
     Returns
     -------
     LintReport
-        ``CODES`` in the module ``bumpwgpu.lint`` says what each code means.
+        ``CODES`` in the module ``bumpwgpu.linting`` says what each code means.
 
     Raises
     ------
