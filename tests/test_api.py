@@ -54,6 +54,11 @@ SIGNATURES = {
     "render": (
         "mesh material * camera lights technique size shadows silhouettes aovs skip device ambient background"
     ),
+    "Renderer": (
+        "mesh material * camera lights technique size shadows silhouettes aovs skip device ambient background"
+    ),
+    "Renderer.render": "self camera",
+    "Renderer.render_many": "self cameras",
     "compare": "source techniques * elevations formats device rays repeats seed progress",
     "dequantise": "source * bits progress **options",
     "tile_report": "source **options",

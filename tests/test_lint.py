@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bumpwgpu.linting import CODES
 from PIL import Image, PngImagePlugin
 
 import bumpwgpu as bw
+from bumpwgpu.linting import CODES
 
 
 @pytest.fixture(scope="module")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -210,3 +211,77 @@ def test_skipping_changes_nothing_here(skip: Any) -> None:
     assert {name for name, count in frame.stats["skipped"].items() if count} <= {skip}
     if skip == "frustum":
         assert frame.stats["skipped"]["frustum"] >= len(mesh.indices)
+
+
+@pytest.mark.gpu
+@pytest.mark.parametrize(
+    ("technique", "silhouettes"), [("relief", False), ("displacement", False), ("exact", True)]
+)
+def test_a_renderer_draws_what_render_draws(technique: str, silhouettes: bool) -> None:
+    mesh, wall = bw.Mesh.sphere(0.5), relief(0.05)
+    scene = [bw.Instance(mesh, wall), bw.Instance(mesh, wall, place(shift=(9, 0, 0)))]
+    options: dict[str, Any] = {
+        "lights": [bw.Light.point((2, 2, 2), intensity=5)],
+        "technique": technique,
+        "silhouettes": silhouettes,
+        "size": (48, 40),
+        "aovs": ("depth", "uv"),
+    }
+    # The second ball comes into view late.
+    cameras = [bw.Camera.look_at((x, 0.5, 3), (x, 0, 0)) for x in (0.0, 0.4, 8.5, 9.0, 0.0)]
+    alone = [bw.render(scene, camera=camera, **options) for camera in cameras]
+    with bw.Renderer(scene, **options) as renderer:
+        together = list(renderer.render_many(cameras))
+        again = renderer.render(cameras[2])
+    assert len(together) == len(cameras)
+    for one, other in [*zip(alone, together, strict=True), (alone[2], again)]:
+        np.testing.assert_array_equal(one.color, other.color)
+        np.testing.assert_array_equal(one.aovs["depth"], other.aovs["depth"])
+        np.testing.assert_array_equal(one.aovs["uv"], other.aovs["uv"])
+    # Prepared once: only micro-polygons, which go with the view, are sent again.
+    if technique == "relief":
+        sent = [frame.stats["bytes_uploaded"] for frame in together]
+        assert sent[0] > 50_000
+        assert max(sent[1], sent[2], sent[3], sent[4]) < 2_000
+        assert all(frame.stats["pipelines_compiled"] == 0 for frame in together[1:])
+
+
+@pytest.mark.gpu
+def test_a_renderer_holds_what_it_has_until_it_is_closed() -> None:
+    scene = [bw.Instance(bw.Mesh.quad(), relief())]
+    renderer = bw.Renderer(scene, size=16)
+    assert isinstance(renderer.camera, bw.Camera)
+    # Frames that nobody takes are given up; others are not mistaken for them.
+    many = renderer.render_many([renderer.camera] * 3)
+    first = next(many)
+    np.testing.assert_array_equal(renderer.render().color, first.color)
+    many.close()
+    assert list(renderer.render_many([])) == []
+    with pytest.raises(TypeError, match="camera must be"):
+        renderer.render("front")  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="camera must be"):
+        list(renderer.render_many([renderer.camera, "front"]))  # type: ignore[list-item]
+    left = renderer.render_many([renderer.camera] * 2)
+    next(left)
+    assert not renderer.closed
+    renderer.close()
+    renderer.close()
+    assert renderer.closed
+    assert "closed" in repr(renderer)
+    with pytest.raises(bw.RenderError, match="closed"):
+        renderer.render()
+    with pytest.raises(bw.RenderError, match="closed"):
+        next(left)
+    with pytest.raises(ValueError, match="empty"):
+        bw.Renderer([])
+
+
+@pytest.mark.gpu
+def test_a_renderer_warns_once() -> None:
+    with bw.Renderer(bw.Mesh.quad(), relief(), technique="normal", shadows=True, size=16) as renderer:
+        with pytest.warns(bw.BumpWarning, match="casts no shadows"):
+            assert renderer.render().warnings
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            assert renderer.render().warnings
+            assert len(list(renderer.render_many([renderer.camera] * 2))) == 2

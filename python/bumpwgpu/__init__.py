@@ -30,6 +30,7 @@ if _TYPE_CHECKING:
     from .mesh_maps import MeshMaps, MeshReport
     from .meshes import Mesh, MeshMaterial, Part
     from .recommending import MipAdvice, Recommendation
+    from .renderer import Renderer
     from .rendering import Frame, HorizonShadows, render
     from .repair import (
         CurlEvidence,
@@ -70,6 +71,7 @@ _HOMES = {
     "mesh_maps": ("MeshMaps", "MeshReport"),
     "meshes": ("Mesh", "MeshMaterial", "Part"),
     "recommending": ("MipAdvice", "Recommendation"),
+    "renderer": ("Renderer",),
     "rendering": ("Frame", "HorizonShadows", "render"),
     "repair": (
         "CurlEvidence",
@@ -122,6 +124,7 @@ __all__ = [
     "Part",
     "Recommendation",
     "RenderError",
+    "Renderer",
     "Scene",
     "Seam",
     "StressResult",

@@ -15,6 +15,7 @@ _Measured: TypeAlias = tuple[str, Sequence[float], float, float, float]
 _Progress: TypeAlias = Callable[..., object] | None
 _Options: TypeAlias = Sequence[tuple[str, bool | int | float | str]]
 _Vector: TypeAlias = tuple[float, float, float]
+_Camera: TypeAlias = tuple[_Vector, _Vector, _Vector, float]
 _Color: TypeAlias = tuple[float, float, float, float]
 _Decoded: TypeAlias = tuple[NDArray[Any], list[str], list[str]]
 
@@ -32,7 +33,9 @@ __all__ = [
     "Mesh",
     "MeshError",
     "RenderError",
+    "Renderer",
     "SegmentReference",
+    "Ticket",
     "adapters",
     "aov_names",
     "bake_detail",
@@ -62,7 +65,6 @@ __all__ = [
     "mesh_map_registry",
     "quantum",
     "read_image",
-    "render",
     "save_map",
     "seams",
     "simd_level",
@@ -121,6 +123,35 @@ class Field:
     def __new__(
         cls, heights: NDArray[np.float32], wrap: str, extent: tuple[float, float, tuple[float, float]]
     ) -> Field: ...
+
+@final
+class Ticket: ...
+
+@final
+class Renderer:
+    def __new__(
+        cls,
+        draws: Sequence[tuple[Mesh, int, int, Material, Sequence[float]]],
+        camera: _Camera,
+        lights: Sequence[tuple[bool, _Vector, _Vector, float]],
+        ambient: _Vector,
+        background: _Color,
+        technique: str,
+        parameters: _Parameters,
+        size: tuple[int, int],
+        shadows: bool | None,
+        horizon: tuple[int, float] | None,
+        silhouettes: bool,
+        aovs: Sequence[str],
+        skips: Sequence[str],
+    ) -> Renderer: ...
+    def render(self, camera: _Camera) -> _RenderResult: ...
+    def start(self, camera: _Camera) -> Ticket: ...
+    def finish(self, ticket: Ticket) -> _RenderResult: ...
+    def abandon(self, ticket: Ticket) -> None: ...
+    def close(self) -> None: ...
+    @property
+    def closed(self) -> bool: ...
 
 @final
 class Material:
@@ -313,21 +344,6 @@ def march_gpu(
 ) -> tuple[dict[str, NDArray[Any]], float]: ...
 def quantum(heights: NDArray[np.float32]) -> float | None: ...
 def read_image(path: _Path) -> _Decoded: ...
-def render(
-    draws: Sequence[tuple[Mesh, int, int, Material, Sequence[float]]],
-    camera: tuple[_Vector, _Vector, _Vector, float],
-    lights: Sequence[tuple[bool, _Vector, _Vector, float]],
-    ambient: _Vector,
-    background: _Color,
-    technique: str,
-    parameters: _Parameters,
-    size: tuple[int, int],
-    shadows: bool | None,
-    horizon: tuple[int, float] | None,
-    silhouettes: bool,
-    aovs: Sequence[str],
-    skips: Sequence[str],
-) -> _RenderResult: ...
 def save_map(
     map: str,
     layers: Sequence[NDArray[Any]],

@@ -101,9 +101,10 @@ class Frame:
         The additional outputs that were asked for; see :func:`render`.
     stats : dict
         Times in milliseconds (``prepare_ms``, ``compile_ms``, ``draw_ms``, ``readback_ms``,
-        ``total_ms``), ``triangles_drawn``, ``triangles_culled``, ``pixels_covered``,
+        ``total_ms``), what was prepared for it (``maps_baked``, ``pipelines_compiled``, ``bytes_uploaded``),
+        ``triangles_drawn``, ``triangles_culled``, ``pixels_covered``,
         ``pixels_marched``, ``pixels_skipped``, ``pixels_unconverged``, ``steps``, ``shadow_rays``,
-        ``maps_baked``, ``skipped`` (see `skip` of :func:`render`), and whether ``draw_ms`` is from the
+        ``skipped`` (see `skip` of :func:`render`), and whether ``draw_ms`` is from the
         device's own clock.
     warnings : tuple of str
         Settings that could not take effect; also given as Python warnings.
@@ -293,6 +294,44 @@ def render(
     >>> bw.render(bw.Mesh.quad(), wall, size=(32, 16)).color.shape  # doctest: +GPU
     (16, 32, 4)
     """
+    core, view, texts = prepared(
+        mesh,
+        material,
+        camera=camera,
+        lights=lights,
+        technique=technique,
+        size=size,
+        shadows=shadows,
+        silhouettes=silhouettes,
+        aovs=aovs,
+        skip=skip,
+        device=device,
+        ambient=ambient,
+        background=background,
+    )
+    frame = frame_of(core.render(camera_values(view)), texts)
+    for text in frame.warnings:
+        warnings.warn(text, BumpWarning, stacklevel=2)
+    return frame
+
+
+def prepared(
+    mesh: Any,
+    material: Any,
+    *,
+    camera: Any,
+    lights: Any,
+    technique: Any,
+    size: Any,
+    shadows: Any,
+    silhouettes: Any,
+    aovs: Any,
+    skip: Any,
+    device: Any,
+    ambient: Any,
+    background: Any,
+) -> tuple[_bumpwgpu.Renderer, Camera, list[str]]:
+    """The arguments of :func:`render` checked: the scene on the device, its camera, and warnings."""
     instances = instances_of(mesh, material)
     chosen = get(technique)
     choice("device", device, ("auto", "gpu", "cpu"))
@@ -304,16 +343,13 @@ def render(
     width, height = _size(size)
     if camera is None:
         camera = framing(instances, width / height)
-    elif not isinstance(camera, Camera):
-        raise TypeError(f"camera must be a Camera, got {type(camera).__name__}")
-    draws = [
-        (part.mesh._core, first, end, used._core, part.world_from_object.T.ravel().tolist())
-        for part in instances
-        for first, end, used in part._draws
-    ]
-    result = _bumpwgpu.render(
-        draws,
-        (camera.eye, camera.target, camera.up, camera.fov_y),
+    core = _bumpwgpu.Renderer(
+        [
+            (part.mesh._core, first, end, used._core, part.world_from_object.T.ravel().tolist())
+            for part in instances
+            for first, end, used in part._draws
+        ],
+        camera_values(camera),
         [(lamp.kind == "directional", lamp.vector, lamp.color, lamp.intensity) for lamp in _lights(lights)],
         _ambient(ambient),
         _background(background),
@@ -325,13 +361,23 @@ def render(
         outputs,
         _skips(skip),
     )
-    texts = list(result["warnings"])
+    texts = []
     used = {used for part in instances for *_, used in part._draws}
     if chosen.name != "flat" and all(one.height is None and one.normal is None for one in used):
         texts.append(f"technique {chosen.name!r} has no effect: the material has no height map")
-    for text in texts:
-        warnings.warn(text, BumpWarning, stacklevel=2)
-    return Frame(result["color"], result["aovs"], result["stats"], tuple(texts))
+    return core, camera, texts
+
+
+def camera_values(camera: Any) -> _bumpwgpu._Camera:
+    """A camera as the core takes it."""
+    if not isinstance(camera, Camera):
+        raise TypeError(f"camera must be a Camera, got {type(camera).__name__}")
+    return camera.eye, camera.target, camera.up, camera.fov_y
+
+
+def frame_of(result: _bumpwgpu._RenderResult, texts: list[str]) -> Frame:
+    """A frame from what the core returns, with further warnings."""
+    return Frame(result["color"], result["aovs"], result["stats"], (*result["warnings"], *texts))
 
 
 def _shadows(shadows: Any) -> tuple[bool | None, tuple[int, float] | None]:

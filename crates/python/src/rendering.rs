@@ -1,21 +1,25 @@
 //! Rendering, and marching on the device.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use bake::{Image, Samples};
 use glam::{DMat4, DVec3, Vec3};
 use heightfield::OutputSet;
+use heightfield::technique::Reads;
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use render::{AovSet, Camera, Draw, HorizonShadows, Light, Request, Scene, Skips, TechniqueChoice};
+use render::{
+    AovSet, Camera, Draw, HorizonShadows, Light, RenderError, Renderer, Request, Scene, Skips,
+    TechniqueChoice, Ticket,
+};
 
-use crate::errors::Raise;
+use crate::errors::{Raise, classes};
 use crate::field::Field;
 use crate::march::{hits_to_dict, parse_outputs, parse_technique, provide};
 use crate::mesh::PyMesh;
-use crate::run::run;
+use crate::run::{Task, run};
 
 /// A material; shared, never changed, so that what was uploaded for it is kept between renderings.
 #[pyclass(frozen, module = "bumpwgpu._bumpwgpu", name = "Material")]
@@ -91,54 +95,57 @@ fn parse_draw((mesh, first, end, material, world_from_object): &DrawArg<'_>) -> 
     }
 }
 
-/// Renders runs of triangles into a dict with `color`, `aovs`, `stats` and `warnings`. `horizon`: azimuths and softness (radians) of shadows from a horizon map.
-#[pyfunction(name = "render")]
-#[expect(clippy::too_many_arguments, reason = "one flat call from the Python facade")]
-pub fn render_scene<'py>(
-    py: Python<'py>,
-    draws: Vec<DrawArg<'py>>,
-    camera: CameraArg,
-    lights: Vec<LightArg>,
-    ambient: [f32; 3],
-    background: [f32; 4],
-    technique: &str,
-    parameters: Vec<(String, f64)>,
-    size: [u32; 2],
-    shadows: Option<bool>,
-    horizon: Option<(u32, f32)>,
-    silhouettes: bool,
-    aovs: Vec<String>,
-    skips: Vec<String>,
-) -> PyResult<Bound<'py, PyDict>> {
-    let technique = parse_choice(technique, &parameters)?;
-    let aovs = aovs.iter().try_fold(AovSet::NONE, |set, name| {
-        let known = || AovSet::NAMED.map(|(name, _)| name).join(", ");
-        AovSet::named(name)
-            .map(|aov| set | aov)
-            .ok_or_else(|| PyValueError::new_err(format!("unknown output {name:?}; known: {}", known())))
-    })?;
-    let skips = skips.iter().try_fold(Skips::NONE, |set, name| {
-        Skips::named(name)
-            .map(|skip| set | skip)
-            .ok_or_else(|| PyValueError::new_err(format!("unknown kind of work to skip {name:?}")))
-    })?;
-    let draws: Vec<_> = draws.iter().map(parse_draw).collect();
-    let (eye, target, up, fov_y) = camera;
-    let frame = run(py, None, |task| {
-        let device = render::device()?;
-        if let TechniqueChoice::Search(technique) = &technique {
-            for draw in &draws {
-                provide(task, &draw.material.field, technique.info.reads)?;
-            }
-        }
+fn parse_camera((eye, target, up, fov_y): CameraArg) -> Camera {
+    Camera { eye: eye.into(), target: target.into(), up: up.into(), fov_y: fov_y.to_radians() }
+}
+
+/// A picture under way.
+#[pyclass(frozen, module = "bumpwgpu._bumpwgpu", name = "Ticket")]
+pub struct PyTicket(Ticket);
+
+/// A scene on the device: runs of triangles with what is asked of their pictures.
+#[pyclass(frozen, module = "bumpwgpu._bumpwgpu", name = "Renderer")]
+pub struct PyRenderer {
+    inner: Mutex<Option<Renderer<'static>>>,
+    reads: Option<Reads>,
+}
+
+#[pymethods]
+impl PyRenderer {
+    /// `horizon`: azimuths and softness (radians) of shadows from a horizon map.
+    #[new]
+    #[expect(clippy::too_many_arguments, reason = "one flat call from the Python facade")]
+    fn new(
+        py: Python<'_>,
+        draws: Vec<DrawArg<'_>>,
+        camera: CameraArg,
+        lights: Vec<LightArg>,
+        ambient: [f32; 3],
+        background: [f32; 4],
+        technique: &str,
+        parameters: Vec<(String, f64)>,
+        size: [u32; 2],
+        shadows: Option<bool>,
+        horizon: Option<(u32, f32)>,
+        silhouettes: bool,
+        aovs: Vec<String>,
+        skips: Vec<String>,
+    ) -> PyResult<Self> {
+        let technique = parse_choice(technique, &parameters)?;
+        let aovs = aovs.iter().try_fold(AovSet::NONE, |set, name| {
+            let known = || AovSet::NAMED.map(|(name, _)| name).join(", ");
+            AovSet::named(name)
+                .map(|aov| set | aov)
+                .ok_or_else(|| PyValueError::new_err(format!("unknown output {name:?}; known: {}", known())))
+        })?;
+        let skips = skips.iter().try_fold(Skips::NONE, |set, name| {
+            Skips::named(name)
+                .map(|skip| set | skip)
+                .ok_or_else(|| PyValueError::new_err(format!("unknown kind of work to skip {name:?}")))
+        })?;
         let scene = Scene {
-            draws,
-            camera: Camera {
-                eye: eye.into(),
-                target: target.into(),
-                up: up.into(),
-                fov_y: fov_y.to_radians(),
-            },
+            draws: draws.iter().map(parse_draw).collect(),
+            camera: parse_camera(camera),
             lights: lights.into_iter().map(parse_light).collect(),
             ambient,
             background,
@@ -146,9 +153,86 @@ pub fn render_scene<'py>(
         let horizon = horizon.map(|(azimuths, softness)| HorizonShadows { azimuths, softness });
         let plain = Request::new(technique, size[0], size[1]);
         let request = Request { shadows, horizon, silhouettes, aovs, skips, ..plain };
-        render::render(&device, &scene, &request)
-    })?;
-    frame_to_dict(py, frame)
+        let made = run(py, None, |_| Renderer::new(render::device()?, scene, request))?;
+        let reads = match &technique {
+            TechniqueChoice::Search(technique) => Some(technique.info.reads),
+            TechniqueChoice::Plain(_) => None,
+        };
+        Ok(Self { inner: Mutex::new(Some(made)), reads })
+    }
+
+    /// A picture of one view: a dict with `color`, `aovs`, `stats` and `warnings`.
+    fn render<'py>(&self, py: Python<'py>, camera: CameraArg) -> PyResult<Bound<'py, PyDict>> {
+        let frame = self.with(py, |renderer, task| {
+            let ticket = self.begin(renderer, task, camera)?;
+            renderer.finish(ticket)
+        })?;
+        frame_to_dict(py, frame)
+    }
+
+    /// Has the device draw a view.
+    fn start(&self, py: Python<'_>, camera: CameraArg) -> PyResult<PyTicket> {
+        self.with(py, |renderer, task| self.begin(renderer, task, camera)).map(PyTicket)
+    }
+
+    /// Waits for a picture that was started.
+    fn finish<'py>(&self, py: Python<'py>, ticket: &PyTicket) -> PyResult<Bound<'py, PyDict>> {
+        let ticket = ticket.0;
+        let frame = self.with(py, |renderer, _| renderer.finish(ticket))?;
+        frame_to_dict(py, frame)
+    }
+
+    /// Gives a picture up that was started.
+    fn abandon(&self, ticket: &PyTicket) {
+        if let Some(renderer) = self.lock().as_mut() {
+            renderer.abandon(ticket.0);
+        }
+    }
+
+    /// Frees what the scene takes on the device.
+    fn close(&self, py: Python<'_>) {
+        py.detach(|| drop(self.lock().take()));
+    }
+
+    /// Whether it has been closed.
+    #[getter]
+    fn closed(&self) -> bool {
+        self.lock().is_none()
+    }
+}
+
+impl PyRenderer {
+    fn lock(&self) -> MutexGuard<'_, Option<Renderer<'static>>> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn with<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut Renderer<'static>, &Task) -> Result<T, RenderError> + Send,
+    ) -> PyResult<T> {
+        // The lock is taken without the interpreter's: another thread may hold it while it needs that.
+        let done =
+            run(py, None, |task| self.lock().as_mut().map(|renderer| work(renderer, task)).transpose())?;
+        done.ok_or_else(|| classes::RenderError::new_err("the renderer is closed"))
+    }
+
+    /// Bakes what the search reads of draws that come into view, where it can be interrupted, and starts.
+    fn begin(
+        &self,
+        renderer: &mut Renderer<'_>,
+        task: &Task,
+        camera: CameraArg,
+    ) -> Result<Ticket, RenderError> {
+        let camera = parse_camera(camera);
+        camera.validate()?;
+        if let Some(reads) = self.reads {
+            for field in renderer.fields_to_prepare(&camera) {
+                provide(task, &field, reads)?;
+            }
+        }
+        renderer.start(camera)
+    }
 }
 
 fn frame_to_dict(py: Python<'_>, frame: render::Frame) -> PyResult<Bound<'_, PyDict>> {
@@ -185,6 +269,8 @@ fn frame_to_dict(py: Python<'_>, frame: render::Frame) -> PyResult<Bound<'_, PyD
     stats.set_item("readback_ms", s.readback_ms)?;
     stats.set_item("total_ms", s.total_ms)?;
     stats.set_item("maps_baked", s.maps_baked)?;
+    stats.set_item("pipelines_compiled", s.pipelines_compiled)?;
+    stats.set_item("bytes_uploaded", s.bytes_uploaded)?;
     stats.set_item("triangles_drawn", s.triangles_drawn)?;
     stats.set_item("triangles_culled", s.triangles_culled)?;
     stats.set_item("pixels_covered", s.pixels_covered)?;

@@ -33,7 +33,7 @@ impl Camera {
     }
 
     /// Unit axes to the right and up in the picture, and into it.
-    fn axes(&self) -> (DVec3, DVec3, DVec3) {
+    pub(crate) fn axes(&self) -> (DVec3, DVec3, DVec3) {
         let forward = self.forward();
         let right = forward.cross(self.up).normalize_or_zero();
         (right, right.cross(forward), forward)

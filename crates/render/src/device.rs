@@ -177,6 +177,26 @@ impl Device {
             .map_err(|error| RenderError::Device { during, message: error.to_string() })
     }
 
+    /// Waits until the device has done what was submitted then.
+    pub(crate) fn wait_for(
+        &self,
+        submission: wgpu::SubmissionIndex,
+        during: &'static str,
+    ) -> Result<(), RenderError> {
+        self.device
+            .poll(wgpu::PollType::Wait { submission_index: Some(submission), timeout: None })
+            .map(|_| ())
+            .map_err(|error| RenderError::Device { during, message: error.to_string() })
+    }
+
+    /// Fails in a process that was forked off the one that opened the device: its threads stayed there.
+    pub(crate) fn check_process(&self) -> Result<(), RenderError> {
+        if self.process == std::process::id() {
+            return Ok(());
+        }
+        Err(RenderError::DeviceLost("it was opened by the process that this one was forked from".to_owned()))
+    }
+
     /// Fails when `got` is more than the device's `limit`.
     pub(crate) fn check(what: &'static str, got: u64, limit: u64) -> Result<(), RenderError> {
         if got > limit { Err(RenderError::Limit { what, got, limit }) } else { Ok(()) }

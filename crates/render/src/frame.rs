@@ -46,9 +46,13 @@ pub struct Stats {
     pub total_ms: f64,
     /// Maps baked for this rendering; those of an earlier one are kept as long as their heights.
     pub maps_baked: u32,
+    /// Pipelines compiled for it; those of an earlier rendering are kept with the device.
+    pub pipelines_compiled: u32,
+    /// Bytes of meshes, maps and parameters sent to the device.
+    pub bytes_uploaded: u64,
     /// Triangles sent to the device.
     pub triangles_drawn: u64,
-    /// Triangles of draws that lie wholly outside the picture.
+    /// Triangles not sent: outside the picture, turned away or hidden.
     pub triangles_culled: u64,
     /// Pixels that show a mesh.
     pub pixels_covered: u64,

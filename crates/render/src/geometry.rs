@@ -1,15 +1,20 @@
 //! Meshes on the device.
 
-use glam::{DMat4, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 use mesh::{Displaced, Mesh};
 use rayon::prelude::*;
 
 use crate::pipeline::ATTRIBUTES;
-use crate::{Device, Draw, RenderError};
+use crate::{Device, RenderError};
 
-/// Vertex and index buffers of a mesh; only the attributes asked for.
+/// Vertex buffers with their shader locations, in the order in which pipelines take them.
+#[derive(Clone, Default)]
+pub(crate) struct Attributes(pub Vec<(usize, wgpu::Buffer)>);
+
+/// What is drawn in one call: vertices, and triangles between them.
+#[derive(Clone)]
 pub(crate) struct Geometry {
-    pub attributes: [Option<wgpu::Buffer>; ATTRIBUTES.len()],
+    pub attributes: Attributes,
     pub indices: wgpu::Buffer,
 }
 
@@ -29,10 +34,19 @@ pub(crate) const CUBOID: [[u32; 3]; 12] = [
     [4, 7, 6],
 ];
 
-/// The middle of a mesh. Positions are uploaded relative to it.
-pub(crate) fn centre(mesh: &Mesh) -> DVec3 {
-    let (low, high) = bounds(&mesh.positions);
-    (low.as_dvec3() + high.as_dvec3()) * 0.5
+/// Room that a mesh takes: its middle, to which positions are uploaded relative, and half its diagonal.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Room {
+    pub middle: DVec3,
+    pub radius: f64,
+}
+
+impl Room {
+    pub fn of(mesh: &Mesh) -> Self {
+        let (low, high) = bounds(&mesh.positions);
+        let (low, high) = (low.as_dvec3(), high.as_dvec3());
+        Self { middle: (low + high) * 0.5, radius: (high - low).length() * 0.5 }
+    }
 }
 
 fn bounds(positions: &[Vec3]) -> (Vec3, Vec3) {
@@ -44,33 +58,15 @@ fn bounds(positions: &[Vec3]) -> (Vec3, Vec3) {
     if low.is_finite() { (low, high) } else { (Vec3::ZERO, Vec3::ZERO) }
 }
 
-/// Middle and radius of a ball around a draw in camera-relative world space, relief included.
-pub(crate) fn ball(draw: &Draw<'_>, relative_from_object: DMat4) -> (DVec3, f64) {
-    let (low, high) = bounds(&draw.mesh.positions);
-    let relief = f64::from(draw.material.field.extent().scale);
-    let half = (high.as_dvec3() - low.as_dvec3()) * 0.5 + DVec3::splat(relief);
-    let stretch = [relative_from_object.x_axis, relative_from_object.y_axis, relative_from_object.z_axis]
-        .map(|axis| axis.truncate().length_squared());
-    // The Frobenius norm is never less than the longest stretch.
-    (relative_from_object.w_axis.truncate(), half.length() * stretch.iter().sum::<f64>().sqrt())
-}
-
-impl Geometry {
-    /// Uploads a mesh whose middle is `centre`, with the attributes at the given shader locations.
+impl Attributes {
+    /// Uploads the attributes of a mesh, whose middle is `centre`, at the given shader locations.
     pub fn new(
         device: &Device,
         mesh: &Mesh,
         centre: DVec3,
         locations: &[usize],
     ) -> Result<Self, RenderError> {
-        let mut geometry = Self {
-            attributes: Default::default(),
-            indices: device.buffer_with(
-                "indices",
-                bytemuck::cast_slice(&mesh.indices),
-                wgpu::BufferUsages::INDEX,
-            )?,
-        };
+        let mut attributes = Self::default();
         let bend = if locations.contains(&6) { mesh.normal_derivatives() } else { Default::default() };
         for &location in locations {
             let centred: Vec<Vec3>;
@@ -87,47 +83,39 @@ impl Geometry {
                 6 => bytemuck::cast_slice(&bend[0]),
                 _ => bytemuck::cast_slice(&bend[1]),
             };
-            let label = ATTRIBUTES[location].0;
-            geometry.attributes[location] =
-                Some(device.buffer_with(label, bytes, wgpu::BufferUsages::VERTEX)?);
+            attributes.add(device, location, bytes)?;
         }
-        Ok(geometry)
+        Ok(attributes)
     }
 
+    fn add(&mut self, device: &Device, location: usize, bytes: &[u8]) -> Result<(), RenderError> {
+        let label = ATTRIBUTES[location].0;
+        self.0.push((location, device.buffer_with(label, bytes, wgpu::BufferUsages::VERTEX)?));
+        Ok(())
+    }
+}
+
+impl Geometry {
     /// Uploads a box, wound to be seen from outside.
     pub fn cuboid(device: &Device, low: Vec3, high: Vec3) -> Result<Self, RenderError> {
         let corner =
             |bits: u32| Vec3::from([0, 1, 2].map(|axis| [low, high][(bits >> axis & 1) as usize][axis]));
         let corners: [Vec3; 8] = [0, 1, 2, 3, 4, 5, 6, 7].map(corner);
         let bytes = bytemuck::cast_slice(&corners);
-        let mut geometry = Self {
-            attributes: Default::default(),
-            indices: device.buffer_with("box", bytemuck::cast_slice(&CUBOID), wgpu::BufferUsages::INDEX)?,
-        };
-        geometry.attributes[0] =
-            Some(device.buffer_with("box corners", bytes, wgpu::BufferUsages::VERTEX)?);
-        Ok(geometry)
+        let mut attributes = Attributes::default();
+        attributes.add(device, 0, bytes)?;
+        let indices = device.buffer_with("box", bytemuck::cast_slice(&CUBOID), wgpu::BufferUsages::INDEX)?;
+        Ok(Self { attributes, indices })
     }
 
     /// Uploads micro-polygons.
     pub fn micro(device: &Device, displaced: &Displaced) -> Result<Self, RenderError> {
-        let vertex = wgpu::BufferUsages::VERTEX;
-        let mut geometry = Self {
-            attributes: Default::default(),
-            indices: device.buffer_with(
-                "micro-triangles",
-                bytemuck::cast_slice(&displaced.indices),
-                wgpu::BufferUsages::INDEX,
-            )?,
-        };
-        for (location, bytes) in [
-            (0, bytemuck::cast_slice(&displaced.positions)),
-            (8, bytemuck::cast_slice(&displaced.faces)),
-            (9, bytemuck::cast_slice(&displaced.weights)),
-        ] {
-            geometry.attributes[location] =
-                Some(device.buffer_with(ATTRIBUTES[location].0, bytes, vertex)?);
-        }
-        Ok(geometry)
+        let mut attributes = Attributes::default();
+        attributes.add(device, 0, bytemuck::cast_slice(&displaced.positions))?;
+        attributes.add(device, 8, bytemuck::cast_slice(&displaced.faces))?;
+        attributes.add(device, 9, bytemuck::cast_slice(&displaced.weights))?;
+        let bytes = bytemuck::cast_slice(&displaced.indices);
+        let indices = device.buffer_with("micro-triangles", bytes, wgpu::BufferUsages::INDEX)?;
+        Ok(Self { attributes, indices })
     }
 }

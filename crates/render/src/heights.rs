@@ -10,7 +10,7 @@ use heightfield::{BakedMap, ConeMap, HeightField};
 use crate::texture::{MipLevel, sampler, upload};
 use crate::uniforms::{DistanceInfo, HeightInfo, wrap_code};
 use crate::uploads::{Kind, Resource};
-use crate::{Device, RenderError};
+use crate::{Device, RenderError, tally};
 
 /// What the shaders need to know about a field. The pyramid's part is filled in when `with_pyramid`.
 pub fn height_info(field: &HeightField, with_pyramid: bool) -> HeightInfo {
@@ -170,6 +170,7 @@ impl Device {
             self.queue.write_buffer(&buffer, 0, bytes);
             Ok(())
         })?;
+        tally::uploaded(bytes.len() as u64);
         Ok(buffer)
     }
 }

@@ -44,7 +44,14 @@ impl Layouts {
         let heights_filter =
             if filterable { SamplerBindingType::Filtering } else { SamplerBindingType::NonFiltering };
         let draw = [
-            entry(0, ShaderStages::VERTEX_FRAGMENT, storage(true)),
+            BindGroupLayoutEntry {
+                ty: BindingType::Buffer {
+                    ty: BufferBindingType::Storage { read_only: true },
+                    has_dynamic_offset: true,
+                    min_binding_size: None,
+                },
+                ..entry(0, ShaderStages::VERTEX_FRAGMENT, storage(true))
+            },
             entry(1, ShaderStages::FRAGMENT, storage(true)),
             entry(2, ShaderStages::FRAGMENT, storage(true)),
             entry(3, ShaderStages::FRAGMENT, storage(true)),

@@ -21,6 +21,8 @@ pub(crate) struct View<'a> {
     pub centre: DVec3,
     /// Pixels across and down.
     pub size: [u32; 2],
+    /// Whether what is outside the picture may be left out.
+    pub culled: bool,
 }
 
 impl View<'_> {
@@ -54,6 +56,9 @@ pub(crate) fn displaced(
     let reach = f64::from(extent.scale) * view.stretch();
     let aspect = f64::from(view.size[0]) / f64::from(view.size[1]);
     let keep = |face: u32| {
+        if !view.culled {
+            return true;
+        }
         let corners =
             draw.mesh.indices[face as usize].map(|at| view.relative(draw.mesh.positions[at as usize]));
         let centre = (corners[0] + corners[1] + corners[2]) / 3.0;

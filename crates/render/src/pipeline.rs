@@ -9,7 +9,7 @@ use crate::device::lock;
 use crate::layouts::reads_shell;
 use crate::request::Program;
 use crate::targets::{DEPTH_FORMAT, TARGET_FORMATS, TargetSet};
-use crate::{Device, RenderError, TechniqueChoice};
+use crate::{Device, RenderError, TechniqueChoice, tally};
 
 /// All that makes one pipeline different from another.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -124,6 +124,7 @@ impl Device {
                 Pipeline::Render(self.render_pipeline(&key, &module, options))
             })
         })?;
+        tally::compiled();
         let pipeline = Arc::new(pipeline);
         lock(&self.pipelines).insert(key, Arc::clone(&pipeline));
         Ok(pipeline)

@@ -1,155 +1,206 @@
-//! From a scene to what the device draws: maps, buffers, bind groups, pipelines.
+//! From a draw to what the device needs for it, whatever the view: maps, buffers, bind groups, pipelines. Draws of
+//! the same mesh share its buffers, those of materials that look alike their maps.
 
 use std::collections::HashMap;
+use std::num::NonZeroU64;
 use std::sync::Arc;
 use std::time::Instant;
 
-use glam::{DMat4, Vec4};
+use glam::{DVec3, Vec4};
 use mesh::Mesh;
 
-use crate::geometry::{CUBOID, Geometry, ball, centre};
+use crate::clusters::{Cluster, Clusters};
+use crate::geometry::{Attributes, CUBOID, Geometry};
 use crate::heights::bind;
-use crate::layouts::MaterialMaps;
-use crate::micro::{self, View};
+use crate::materials::{MaterialKey, material_group};
 use crate::pipeline::{Pipeline, PipelineKey, attributes, constants_of, endless, reads_of};
 use crate::request::Program;
 use crate::shell::Shell;
 use crate::targets::TargetSet;
-use crate::texture;
 use crate::triangles::Triangles;
-use crate::uniforms::{DrawInfo, HorizonInfo, LightInfo, MaterialInfo, wrap_code};
-use crate::uploads::{Kind, Resource};
-use crate::{
-    Device, Draw, HorizonShadows, Light, Material, RenderError, Request, Scene, Skips, Stats, TechniqueChoice,
-};
+use crate::uniforms::{DrawInfo, LightInfo};
+use crate::{Device, Draw, Light, RenderError, Request, Scene, Stats, TechniqueChoice};
 
-/// One draw, ready.
-pub(crate) struct Prepared {
+/// What is drawn of a draw the same way in all views.
+pub(crate) struct Fixed {
     pub pipeline: Arc<Pipeline>,
-    pub geometry: Arc<Geometry>,
-    pub locations: &'static [usize],
-    pub triangles: std::ops::Range<u32>,
+    pub geometry: Geometry,
+    /// Groups that may be left out; none where all is drawn or nothing.
+    pub groups: Option<Arc<[Cluster]>>,
+    pub triangles: u32,
+}
+
+/// What is cut anew for each view; its pipeline is compiled when the first cut gives anything.
+pub(crate) struct Cutting {
+    pub key: PipelineKey,
+    /// Only the bridges between charts.
+    pub only_bridges: bool,
+}
+
+/// A draw, ready.
+pub(crate) struct Prepared {
     pub field: Option<wgpu::BindGroup>,
     pub material: wgpu::BindGroup,
-    pub draw: wgpu::BindGroup,
+    /// Group 3, at an offset that the view chooses.
+    pub place: wgpu::BindGroup,
+    pub fixed: Option<Fixed>,
+    pub cutting: Option<Cutting>,
 }
 
-/// One pipeline's share of a draw: its program and what it draws.
-struct Part {
-    program: Program,
-    geometry: Arc<Geometry>,
-    triangles: std::ops::Range<u32>,
+/// A run of a mesh's triangles on the device.
+#[derive(Clone)]
+struct Run {
+    indices: wgpu::Buffer,
+    groups: Arc<[Cluster]>,
 }
 
-/// Meshes that have been uploaded, by the attributes they have there.
-type Meshes = HashMap<(*const Mesh, &'static [usize]), Arc<Geometry>>;
+/// A shell on the device.
+#[derive(Clone)]
+struct ShellParts {
+    place: wgpu::BindGroup,
+    cuboid: Geometry,
+}
 
-/// Prepares all draws that may be in the picture.
-pub(crate) fn draws(
-    device: &Device,
-    scene: &Scene<'_>,
-    request: &Request,
-    shadows: bool,
-    stats: &mut Stats,
-    warnings: &mut Vec<String>,
-) -> Result<Vec<Prepared>, RenderError> {
-    let size = [request.width, request.height];
-    let aspect = f64::from(request.width) / f64::from(request.height);
-    let mut meshes = Meshes::new();
-    let mut prepared = Vec::new();
-    for (index, draw) in scene.draws.iter().enumerate() {
-        let middle = centre(&draw.mesh);
-        let relative_from_object = DMat4::from_translation(-scene.camera.eye)
-            * draw.world_from_object
-            * DMat4::from_translation(middle);
-        let count = u64::from(draw.triangles.end - draw.triangles.start);
-        let (ball_centre, radius) = ball(draw, relative_from_object);
-        let unseen =
-            request.skips.contains(Skips::FRUSTUM) && scene.camera.misses_ball(aspect, ball_centre, radius);
-        if count == 0 || unseen {
-            stats.triangles_culled += count;
-            stats.skipped.add(Skips::FRUSTUM, count);
-            continue;
-        }
-        let view = View { camera: &scene.camera, relative_from_object, centre: middle, size };
+/// What draws share. Everything is known by where it is in memory, which the scene keeps alive.
+pub(crate) struct Shared {
+    /// Places of the draws in a view, [`Shared::stride`] bytes apart.
+    pub places: wgpu::Buffer,
+    /// Bytes from one draw's place to the next one's.
+    pub stride: u64,
+    meshes: HashMap<(usize, &'static [usize]), Attributes>,
+    runs: HashMap<(usize, u32, u32), Run>,
+    vertices: HashMap<usize, Triangles>,
+    shells: HashMap<(usize, usize, u32, u32), ShellParts>,
+    materials: HashMap<MaterialKey, wgpu::BindGroup>,
+    place: wgpu::BindGroup,
+}
+
+/// Where a mesh is in memory.
+pub(crate) fn address(mesh: &Mesh) -> usize {
+    std::ptr::from_ref(mesh) as usize
+}
+
+/// The entry of a map, made if there is none.
+fn entry<K: Eq + std::hash::Hash, V: Clone>(
+    known: &mut HashMap<K, V>,
+    key: K,
+    make: impl FnOnce() -> Result<V, RenderError>,
+) -> Result<V, RenderError> {
+    if let Some(value) = known.get(&key) {
+        return Ok(value.clone());
+    }
+    let value = make()?;
+    known.insert(key, value.clone());
+    Ok(value)
+}
+
+impl Shared {
+    /// Room for so many draws.
+    pub fn new(device: &Device, draws: usize) -> Result<Self, RenderError> {
+        let alignment = u64::from(device.device.limits().min_storage_buffer_offset_alignment).max(16);
+        let stride = (size_of::<DrawInfo>() as u64).next_multiple_of(alignment);
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+        let places = device.buffer("places", stride * draws.max(1) as u64, usage)?;
+        let place = place_group(device, &places, None)?;
+        Ok(Self {
+            places,
+            stride,
+            place,
+            meshes: HashMap::new(),
+            runs: HashMap::new(),
+            vertices: HashMap::new(),
+            shells: HashMap::new(),
+            materials: HashMap::new(),
+        })
+    }
+
+    /// Prepares a draw whose mesh has its middle at `middle`.
+    pub fn prepare(
+        &mut self,
+        device: &Device,
+        draw: &Draw<'_>,
+        middle: DVec3,
+        request: &Request,
+        shadows: bool,
+        stats: &mut Stats,
+    ) -> Result<Prepared, RenderError> {
+        let has_height = draw.material.field.extent().scale > 0.0;
         // A shell of no height holds nothing; on the mesh itself the search sees the same.
-        let in_shell = request.in_shell() && draw.material.field.extent().scale > 0.0;
-        let shell = if in_shell || request.technique.draws_geometry() {
-            Some(Shell::new(device, draw, middle)?)
+        let in_shell = request.in_shell() && has_height;
+        let displaces = request.technique.draws_geometry();
+        let has_shell = in_shell || displaces;
+        let mut program = request.technique.program(draw.material.normal.is_some());
+        program.horizon = !has_shell
+            && request.horizon.is_some()
+            && request.shadows != Some(false)
+            && request.technique.takes_horizon();
+        // Light rays through a relief of no height meet nothing.
+        let shadows = shadows && (has_height || !has_shell);
+        let key = |program| key(draw, request, program, shadows);
+
+        let field = reads_of(&request.technique)
+            .map(|reads| device.field_group(&draw.material.field, reads))
+            .transpose()?;
+        let material = entry(&mut self.materials, MaterialKey::new(&draw.material, program), || {
+            material_group(device, &draw.material, program, request.horizon, stats)
+        })?;
+        let mut compiled = |program| {
+            let before = Instant::now();
+            let pipeline = device.pipeline(key(program));
+            stats.compile_ms += before.elapsed().as_secs_f64() * 1e3;
+            pipeline
+        };
+        if !has_shell {
+            let locations = attributes(program.entry);
+            let geometry = entry(&mut self.meshes, (address(&draw.mesh), locations), || {
+                Attributes::new(device, &draw.mesh, middle, locations)
+            })?;
+            let Run { indices, groups } = self.run(device, draw, middle)?;
+            let fixed = Fixed {
+                pipeline: compiled(program)?,
+                geometry: Geometry { attributes: geometry, indices },
+                triangles: draw.triangles.end - draw.triangles.start,
+                groups: Some(groups),
+            };
+            let place = self.place.clone();
+            return Ok(Prepared { field, material, place, fixed: Some(fixed), cutting: None });
+        }
+        let ShellParts { place, cuboid } = self.shell(device, draw, middle)?;
+        let cut = Program { entry: "displaced", ..program };
+        let cutting = Some(Cutting { key: key(cut), only_bridges: in_shell });
+        let fixed = if in_shell {
+            let pipeline = compiled(Program { entry: "shell", ..program })?;
+            Some(Fixed { pipeline, geometry: cuboid, triangles: CUBOID.len() as u32, groups: None })
         } else {
             None
         };
-        let seen_in = shell.as_ref().filter(|_| in_shell);
-        let parts = parts(device, draw, request, &view, seen_in, &mut meshes, |coarser| {
-            warnings.push(format!(
-                "draw {index}: micro-polygons are up to {coarser:.1} pixels wide, to keep their number down"
-            ));
-        })?;
-        let reads = reads_of(&request.technique);
-        let field = reads.map(|reads| device.field_group(&draw.material.field, reads)).transpose()?;
-        // Light rays through a relief of no height meet nothing.
-        let shadows = shadows && !(shell.is_some() && draw.material.field.extent().scale == 0.0);
-        let draw_group = draw_group(device, draw, &view, shell.as_ref())?;
-        for Part { program, geometry, triangles } in parts {
-            stats.triangles_drawn += u64::from(triangles.end - triangles.start);
-            let material = material_group(device, &draw.material, program, request.horizon, stats)?;
-            let before = Instant::now();
-            let pipeline = device.pipeline(key(draw, request, program, shadows))?;
-            stats.compile_ms += before.elapsed().as_secs_f64() * 1e3;
-            let (field, draw) = (field.clone(), draw_group.clone());
-            let locations = attributes(program.entry);
-            prepared.push(Prepared { pipeline, geometry, locations, triangles, field, material, draw });
-        }
+        Ok(Prepared { field, material, place, fixed, cutting })
     }
-    Ok(prepared)
-}
 
-/// What is drawn of a draw, and by which programs. `shell`: where rays are traced through it.
-fn parts(
-    device: &Device,
-    draw: &Draw<'_>,
-    request: &Request,
-    view: &View<'_>,
-    shell: Option<&Shell>,
-    meshes: &mut Meshes,
-    mut coarsened: impl FnMut(f64),
-) -> Result<Vec<Part>, RenderError> {
-    let own_normals = draw.material.normal.is_some();
-    let mut program = request.technique.program(own_normals);
-    let mut micro = |program: Program, only_bridges: bool| -> Result<Part, RenderError> {
-        let (displaced, coarser) = micro::displaced(draw, view, only_bridges)?;
-        if coarser > 1.0 {
-            coarsened(coarser);
-        }
-        let geometry = Arc::new(Geometry::micro(device, &displaced)?);
-        Ok(Part { program, geometry, triangles: 0..displaced.indices.len() as u32 })
-    };
-    if let Some(shell) = shell {
-        let [low, high] = shell.bounds;
-        let shell = Part {
-            program: Program { entry: "shell", ..program },
-            geometry: Arc::new(Geometry::cuboid(device, low, high)?),
-            triangles: 0..CUBOID.len() as u32,
-        };
-        let bridges = micro(Program { entry: "displaced", ..program }, true)?;
-        return Ok([shell, bridges].into_iter().filter(|part| !part.triangles.is_empty()).collect());
+    fn run(&mut self, device: &Device, draw: &Draw<'_>, middle: DVec3) -> Result<Run, RenderError> {
+        let known = (address(&draw.mesh), draw.triangles.start, draw.triangles.end);
+        entry(&mut self.runs, known, || {
+            let Clusters { triangles, groups } = Clusters::new(&draw.mesh, draw.triangles.clone(), middle);
+            let bytes = bytemuck::cast_slice(&triangles);
+            let indices = device.buffer_with("triangles", bytes, wgpu::BufferUsages::INDEX)?;
+            Ok(Run { indices, groups: groups.into() })
+        })
     }
-    if request.technique.draws_geometry() {
-        return Ok(vec![micro(program, false)?]);
+
+    fn shell(&mut self, device: &Device, draw: &Draw<'_>, middle: DVec3) -> Result<ShellParts, RenderError> {
+        let (mesh, run) = (address(&draw.mesh), &draw.triangles);
+        let field = Arc::as_ptr(&draw.material.field) as usize;
+        let (vertices, places) = (&mut self.vertices, &self.places);
+        entry(&mut self.shells, (mesh, field, run.start, run.end), || {
+            let shell = Shell::new(device, draw, middle)?;
+            let triangles = entry(vertices, mesh, || Triangles::new(device, &draw.mesh, middle))?;
+            let [low, high] = shell.bounds;
+            Ok(ShellParts {
+                place: place_group(device, places, Some((&triangles, &shell)))?,
+                cuboid: Geometry::cuboid(device, low, high)?,
+            })
+        })
     }
-    program.horizon =
-        request.horizon.is_some() && request.shadows != Some(false) && request.technique.takes_horizon();
-    let locations = attributes(program.entry);
-    let known = (std::ptr::from_ref::<Mesh>(&draw.mesh), locations);
-    let geometry = match meshes.get(&known) {
-        Some(geometry) => Arc::clone(geometry),
-        None => {
-            let geometry = Arc::new(Geometry::new(device, &draw.mesh, view.centre, locations)?);
-            meshes.insert(known, Arc::clone(&geometry));
-            geometry
-        }
-    };
-    Ok(vec![Part { program, geometry, triangles: draw.triangles.clone() }])
 }
 
 fn key(draw: &Draw<'_>, request: &Request, program: Program, shadows: bool) -> PipelineKey {
@@ -177,22 +228,18 @@ fn key(draw: &Draw<'_>, request: &Request, program: Program, shadows: bool) -> P
 }
 
 /// Group 3, with the mesh and its shell where there is one.
-fn draw_group(
+fn place_group(
     device: &Device,
-    draw: &Draw<'_>,
-    view: &View<'_>,
-    shell: Option<&Shell>,
+    places: &wgpu::Buffer,
+    shell: Option<(&Triangles, &Shell)>,
 ) -> Result<wgpu::BindGroup, RenderError> {
-    let object_from_relative = view.relative_from_object.inverse();
-    let info = DrawInfo {
-        relative_from_object: view.relative_from_object.as_mat4(),
-        object_from_relative: object_from_relative.as_mat4(),
-        eye: object_from_relative.w_axis.as_vec4(),
+    let place = wgpu::BufferBinding {
+        buffer: places,
+        offset: 0,
+        size: NonZeroU64::new(size_of::<DrawInfo>() as u64),
     };
-    let buffer = device.buffer_with("draw", bytemuck::bytes_of(&info), wgpu::BufferUsages::STORAGE)?;
-    let mut entries = vec![bind(0, buffer.as_entire_binding())];
-    let triangles = shell.map(|_| Triangles::new(device, &draw.mesh, view.centre)).transpose()?;
-    if let (Some(triangles), Some(shell)) = (&triangles, shell) {
+    let mut entries = vec![bind(0, wgpu::BindingResource::Buffer(place))];
+    if let Some((triangles, shell)) = shell {
         entries.push(bind(1, triangles.vertices.as_entire_binding()));
         entries.push(bind(2, triangles.indices.as_entire_binding()));
         entries.push(bind(3, shell.nodes.as_entire_binding()));
@@ -208,7 +255,7 @@ fn draw_group(
 }
 
 /// The lights as the shaders want them; never empty, since a buffer must not be.
-pub(crate) fn light_infos(scene: &Scene<'_>) -> Vec<LightInfo> {
+pub(crate) fn light_infos(scene: &Scene<'_>, eye: DVec3) -> Vec<LightInfo> {
     let mut infos: Vec<LightInfo> = scene
         .lights
         .iter()
@@ -218,7 +265,7 @@ pub(crate) fn light_infos(scene: &Scene<'_>) -> Vec<LightInfo> {
                     ((-direction.as_dvec3().normalize()).extend(0.0).as_vec4(), color, intensity)
                 }
                 Light::Point { position, color, intensity } => {
-                    ((position - scene.camera.eye).extend(1.0).as_vec4(), color, intensity)
+                    ((position - eye).extend(1.0).as_vec4(), color, intensity)
                 }
             };
             let [r, g, b] = color;
@@ -229,149 +276,4 @@ pub(crate) fn light_infos(scene: &Scene<'_>) -> Vec<LightInfo> {
         infos.push(LightInfo { place: Vec4::Z, color: Vec4::ZERO });
     }
     infos
-}
-
-fn material_group(
-    device: &Device,
-    material: &Material,
-    program: Program,
-    horizon: Option<HorizonShadows>,
-    stats: &mut Stats,
-) -> Result<wgpu::BindGroup, RenderError> {
-    let field = &material.field;
-    let extent = field.extent();
-    let info = MaterialInfo {
-        albedo_factor: Vec4::from(material.albedo_factor),
-        map_width: field.width() as f32,
-        map_height: field.height() as f32,
-        scale: extent.scale,
-        base: extent.base,
-        specular: material.specular,
-        shininess: material.shininess,
-        period: heightfield::march::period(field.wrap()) as f32,
-        wrap: wrap_code(field.wrap()),
-    };
-    let info = device.buffer_with("material", bytemuck::bytes_of(&info), wgpu::BufferUsages::UNIFORM)?;
-    let albedo = match &material.albedo {
-        Some(image) => {
-            view(device.keep(image, Kind::Albedo, || {
-                let levels = texture::albedo(image);
-                texture::upload(device, "albedo", wgpu::TextureFormat::Rgba8UnormSrgb, &levels, false)
-                    .map(Resource::View)
-            })?)?
-            .0
-        }
-        None => device.keep_white(|| {
-            texture::upload(device, "white", wgpu::TextureFormat::Rgba8UnormSrgb, &texture::white(), false)
-        })?,
-    };
-    let sampler = texture::sampler(device, field.wrap(), true);
-    let map = if program.maps == MaterialMaps::None {
-        None
-    } else {
-        Some(surface_map(device, material, program, stats)?)
-    };
-    let cube =
-        if program.maps == MaterialMaps::MapAndCube {
-            let levels = texture::normalization_cube();
-            Some(device.keep_cube(|| {
-                texture::upload(device, "cube", wgpu::TextureFormat::Rgba8Unorm, &levels, true)
-            })?)
-        } else {
-            None
-        };
-    let cube_sampler = texture::sampler(device, heightfield::Wrap::Clamp, true);
-
-    let mut entries = vec![
-        bind(0, info.as_entire_binding()),
-        bind(1, wgpu::BindingResource::TextureView(&albedo)),
-        bind(2, wgpu::BindingResource::Sampler(&sampler)),
-    ];
-    if let Some(map) = &map {
-        entries.push(bind(3, wgpu::BindingResource::TextureView(map)));
-        entries.push(bind(4, wgpu::BindingResource::Sampler(&sampler)));
-    }
-    if let Some(cube) = &cube {
-        entries.push(bind(5, wgpu::BindingResource::TextureView(cube)));
-        entries.push(bind(6, wgpu::BindingResource::Sampler(&cube_sampler)));
-    }
-    let horizon = horizon.filter(|_| program.horizon);
-    let horizon = horizon.map(|horizon| HorizonBinding::new(device, material, horizon, stats)).transpose()?;
-    if let Some(horizon) = &horizon {
-        entries.push(bind(7, wgpu::BindingResource::TextureView(&horizon.map)));
-        entries.push(bind(8, wgpu::BindingResource::Sampler(&sampler)));
-        entries.push(bind(9, horizon.info.as_entire_binding()));
-    }
-    device.guard("binding a material", || {
-        Ok(device.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("material"),
-            layout: device.layouts.material(program.maps, program.horizon),
-            entries: &entries,
-        }))
-    })
-}
-
-/// What shading/shadow_horizon binds.
-struct HorizonBinding {
-    map: wgpu::TextureView,
-    info: wgpu::Buffer,
-}
-
-impl HorizonBinding {
-    fn new(
-        device: &Device,
-        material: &Material,
-        horizon: HorizonShadows,
-        stats: &mut Stats,
-    ) -> Result<Self, RenderError> {
-        let field = &material.field;
-        let HorizonShadows { azimuths, softness } = horizon;
-        let (map, made) = view(device.keep(field, Kind::Horizon(azimuths), || {
-            texture::horizon(device, field, azimuths).map(Resource::View)
-        })?)?;
-        stats.maps_baked += u32::from(made);
-        let info = HorizonInfo { tile_size: field.extent().tile_size, softness: softness.max(0.0), azimuths };
-        let info = device.buffer_with("horizon", bytemuck::bytes_of(&info), wgpu::BufferUsages::UNIFORM)?;
-        Ok(Self { map, info })
-    }
-}
-
-/// The map at binding 3, baked if the device does not have it.
-fn surface_map(
-    device: &Device,
-    material: &Material,
-    program: Program,
-    stats: &mut Stats,
-) -> Result<wgpu::TextureView, RenderError> {
-    let field = &material.field;
-    let eight_bits = program.surface == "dot3";
-    let upload = |label, format, levels: &[texture::MipLevel]| {
-        texture::upload(device, label, format, levels, false).map(Resource::View)
-    };
-    let (view, made) = view(match (&material.normal, eight_bits) {
-        (Some(image), false) => device.keep(image, Kind::OwnNormals, || {
-            upload("normals", wgpu::TextureFormat::Rgba16Float, &texture::own(image))
-        })?,
-        (Some(image), true) => device.keep(image, Kind::OwnNormals8Bit, || {
-            upload("normals", wgpu::TextureFormat::Rgba8Unorm, &texture::own_8_bit(image))
-        })?,
-        (None, false) => device.keep(field, Kind::Slopes, || {
-            upload("slopes", wgpu::TextureFormat::Rg16Float, &texture::slopes(field)?)
-        })?,
-        (None, true) => device.keep(field, Kind::Baked8Bit, || {
-            upload("normals", wgpu::TextureFormat::Rgba8Unorm, &texture::baked_8_bit(field)?)
-        })?,
-    })?;
-    stats.maps_baked += u32::from(made && material.normal.is_none());
-    Ok(view)
-}
-
-fn view((resource, made): (Resource, bool)) -> Result<(wgpu::TextureView, bool), RenderError> {
-    match resource {
-        Resource::View(view) => Ok((view, made)),
-        Resource::Group(_) => Err(RenderError::Device {
-            during: "looking up a map",
-            message: "a bind group was kept in its place".to_owned(),
-        }),
-    }
 }

@@ -1,5 +1,6 @@
 //! What there is to see: meshes with materials, lights, a camera.
 
+use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -90,7 +91,7 @@ impl<'a> Draw<'a> {
         Self { mesh, triangles, material, world_from_object: DMat4::IDENTITY }
     }
 
-    pub(crate) fn validate(&self, index: usize) -> Result<(), RenderError> {
+    fn validate_mesh(&self, index: usize) -> Result<(), RenderError> {
         let fail = |problem: String| Err(RenderError::Mesh { index, problem });
         let mesh = &*self.mesh;
         let vertices = mesh.positions.len();
@@ -115,6 +116,11 @@ impl<'a> Draw<'a> {
         if let Some(at) = mesh.positions.iter().position(|position| !position.is_finite()) {
             return fail(format!("vertex {at} is at {}", mesh.positions[at]));
         }
+        Ok(())
+    }
+
+    fn validate_place(&self, index: usize) -> Result<(), RenderError> {
+        let fail = |problem: String| Err(RenderError::Mesh { index, problem });
         let matrix = self.world_from_object;
         let determinant = matrix.determinant();
         if !matrix.is_finite()
@@ -213,8 +219,12 @@ impl Scene<'_> {
         for (index, light) in self.lights.iter().enumerate() {
             light.validate(index)?;
         }
+        let mut known = HashSet::new();
         for (index, draw) in self.draws.iter().enumerate() {
-            draw.validate(index)?;
+            if known.insert((std::ptr::from_ref::<Mesh>(&draw.mesh), draw.triangles.clone())) {
+                draw.validate_mesh(index)?;
+            }
+            draw.validate_place(index)?;
             draw.material.validate(index)?;
         }
         Ok(())

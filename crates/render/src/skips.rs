@@ -93,6 +93,11 @@ impl Skipped {
         self.0.iter().zip(Skips::NAMED).filter(|(_, (_, known))| *known == kind).map(|(count, _)| count).sum()
     }
 
+    /// Triangles left out.
+    pub fn culled(&self) -> u64 {
+        [Skips::FRUSTUM, Skips::BACKFACE, Skips::OCCLUSION].map(|kind| self.of(kind)).iter().sum()
+    }
+
     /// All names with their counts.
     pub fn iter(&self) -> impl Iterator<Item = (&'static str, u64)> {
         Skips::NAMED.into_iter().map(|(name, _)| name).zip(self.0)

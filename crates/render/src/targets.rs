@@ -1,5 +1,6 @@
 //! The textures that a rendering draws into, and the way back from them.
 
+use crate::readback::Readback;
 use crate::{AovSet, Device, RenderError};
 
 /// Format of the depth buffer, reversed: 1 near, 0 at infinity.
@@ -58,16 +59,16 @@ impl TargetSet {
     }
 }
 
-/// Textures of one band of the picture, with the buffers they are copied into.
+/// Textures of one band of the picture.
 pub(crate) struct Targets {
     width: u32,
     views: [Option<wgpu::TextureView>; 7],
     textures: [Option<wgpu::Texture>; 7],
-    readback: [Option<wgpu::Buffer>; 7],
     depth: wgpu::TextureView,
 }
 
-fn row_bytes(width: u32, at: usize) -> (u32, u32) {
+/// Bytes of a row of a target, and as copies to buffers lay it out.
+pub(crate) fn row_bytes(width: u32, at: usize) -> (u32, u32) {
     let tight = width * TARGET_FORMATS[at].block_copy_size(None).unwrap_or(16);
     (tight, tight.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT))
 }
@@ -105,20 +106,11 @@ impl Targets {
             })
         };
         let depth = texture(DEPTH_FORMAT, wgpu::TextureUsages::empty())?.create_view(&Default::default());
-        let mut targets = Self {
-            width,
-            views: Default::default(),
-            textures: Default::default(),
-            readback: Default::default(),
-            depth,
-        };
+        let mut targets = Self { width, views: Default::default(), textures: Default::default(), depth };
         for at in (0..7).filter(|&at| set.has(at)) {
             let made = texture(TARGET_FORMATS[at], wgpu::TextureUsages::COPY_SRC)?;
             targets.views[at] = Some(made.create_view(&Default::default()));
             targets.textures[at] = Some(made);
-            let size = u64::from(row_bytes(width, at).1) * u64::from(rows);
-            let usage = wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ;
-            targets.readback[at] = Some(device.buffer("readback", size, usage)?);
         }
         Ok(targets)
     }
@@ -158,8 +150,8 @@ impl Targets {
     }
 
     /// Copies the first `rows` rows of each target to its buffer.
-    pub fn copy(&self, encoder: &mut wgpu::CommandEncoder, rows: u32) {
-        for (at, pair) in self.textures.iter().zip(&self.readback).enumerate() {
+    pub fn copy(&self, encoder: &mut wgpu::CommandEncoder, rows: u32, to: &Readback) {
+        for (at, pair) in self.textures.iter().zip(&to.buffers).enumerate() {
             if let (Some(texture), Some(buffer)) = pair {
                 encoder.copy_texture_to_buffer(
                     texture.as_image_copy(),
@@ -175,35 +167,5 @@ impl Targets {
                 );
             }
         }
-    }
-
-    /// Maps all buffers, waits, and hands the rows of each target to `take(target, row, bytes)`.
-    pub fn read(
-        &self,
-        device: &Device,
-        rows: u32,
-        mut take: impl FnMut(usize, u32, &[u8]),
-    ) -> Result<(), RenderError> {
-        for (at, buffer) in self.readback.iter().enumerate() {
-            if let Some(buffer) = buffer {
-                let bytes = u64::from(row_bytes(self.width, at).1) * u64::from(rows);
-                buffer.slice(..bytes).map_async(wgpu::MapMode::Read, |_| ());
-            }
-        }
-        device.wait("reading the picture back")?;
-        for (at, buffer) in self.readback.iter().enumerate() {
-            let Some(buffer) = buffer else { continue };
-            let (tight, padded) = row_bytes(self.width, at);
-            let mapped =
-                buffer.slice(..u64::from(padded) * u64::from(rows)).get_mapped_range().map_err(|error| {
-                    RenderError::Device { during: "reading the picture back", message: error.to_string() }
-                })?;
-            for (row, bytes) in mapped.chunks_exact(padded as usize).enumerate() {
-                take(at, row as u32, &bytes[..tight as usize]);
-            }
-            drop(mapped);
-            buffer.unmap();
-        }
-        Ok(())
     }
 }

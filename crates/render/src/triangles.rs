@@ -8,6 +8,7 @@ use crate::uniforms::MeshVertex;
 use crate::{Device, RenderError};
 
 /// Bindings 1 and 2 of group 3, `shaders_wgsl/bindings/triangles.wgsl`.
+#[derive(Clone)]
 pub(crate) struct Triangles {
     pub vertices: wgpu::Buffer,
     pub indices: wgpu::Buffer,

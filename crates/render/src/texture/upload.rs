@@ -2,7 +2,7 @@
 
 use heightfield::Wrap;
 
-use crate::{Device, RenderError};
+use crate::{Device, RenderError, tally};
 
 /// One mip level: size and bytes.
 pub(crate) struct MipLevel {
@@ -38,6 +38,7 @@ pub(crate) fn upload(
         for (at, level) in levels.iter().enumerate() {
             let [width, height] = level.size.map(|side| side as u32);
             let (mip, layer) = if cube { (0, at as u32) } else { (at as u32, 0) };
+            tally::uploaded(level.bytes.len() as u64);
             device.queue.write_texture(
                 wgpu::TexelCopyTextureInfo {
                     texture: &texture,

@@ -1,0 +1,431 @@
+//! A scene on the device, and its pictures: validate, prepare what a view shows, draw band by band, read back.
+
+use std::collections::{HashMap, VecDeque};
+use std::sync::Arc;
+use std::time::Instant;
+
+use bytemuck::Zeroable;
+use glam::{DMat4, Vec4};
+use heightfield::HeightField;
+
+use crate::culling::{Culling, Stand};
+use crate::geometry::Room;
+use crate::heights::bind;
+use crate::prepare::{self, Prepared, Shared, address};
+use crate::readback::Readback;
+use crate::tally::Tally;
+use crate::targets::{TargetSet, Targets};
+use crate::timer::Timer;
+use crate::uniforms::{DrawInfo, FrameInfo};
+use crate::unpack::Unpacker;
+use crate::view::{Call, ViewOf};
+use crate::{Camera, Device, Frame, Held, RenderError, Request, Scene, Stats, tally};
+
+/// Pixels drawn at once. Larger pictures are drawn in bands of rows, so that the memory that the
+/// targets take does not grow with the picture.
+pub(crate) const BAND_PIXELS: u64 = 1 << 22;
+
+/// A picture under way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Ticket(u64);
+
+/// A scene for many views. What a view shows is prepared and uploaded when it is first seen, once; pictures may be
+/// under way while others are read back.
+///
+/// The counts and times of preparing are in the statistics of the picture that it was first done for.
+pub struct Renderer<'a> {
+    device: Held<'a, Device>,
+    scene: Scene<'a>,
+    request: Request,
+    shadows: bool,
+    rows_at_once: u32,
+    rooms: HashMap<usize, Room>,
+    shared: Shared,
+    draws: Vec<Option<Prepared>>,
+    targets: Targets,
+    frame: FrameBinding,
+    spare: Vec<Readback>,
+    under_way: VecDeque<UnderWay>,
+    tickets: u64,
+    warnings: Vec<String>,
+    /// Spent since the last picture on what the next one needs.
+    unclaimed: Stats,
+}
+
+/// A band that the device is drawing, and what is known of its picture.
+struct UnderWay {
+    ticket: Ticket,
+    started: Instant,
+    band: Band,
+    unpacker: Unpacker,
+    stats: Stats,
+    warnings: Vec<String>,
+}
+
+struct Band {
+    readback: Readback,
+    first_row: u32,
+    rows: u32,
+    submitted: Instant,
+    drawn: wgpu::SubmissionIndex,
+    copied: wgpu::SubmissionIndex,
+}
+
+impl std::fmt::Debug for Renderer<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Renderer").field("request", &self.request).finish_non_exhaustive()
+    }
+}
+
+impl<'a> Renderer<'a> {
+    /// Takes a scene and what is asked of its pictures.
+    ///
+    /// # Errors
+    /// [`RenderError`]: senseless scenes name the draw or light.
+    pub fn new(
+        device: impl Into<Held<'a, Device>>,
+        scene: Scene<'a>,
+        request: Request,
+    ) -> Result<Self, RenderError> {
+        Self::in_bands(device, scene, request, BAND_PIXELS)
+    }
+
+    /// [`Renderer::new`] with at most `band_pixels` pixels, but at least one row, drawn at a time.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn in_bands(
+        device: impl Into<Held<'a, Device>>,
+        scene: Scene<'a>,
+        request: Request,
+        band_pixels: u64,
+    ) -> Result<Self, RenderError> {
+        let (started, before) = (Instant::now(), Tally::now());
+        let device = device.into();
+        device.check_process()?;
+        let (width, height) = (request.width, request.height);
+        if width == 0 || height == 0 {
+            return Err(RenderError::Size { width, height });
+        }
+        let longest = u64::from(device.device.limits().max_texture_dimension_2d);
+        Device::check("picture width, in pixels,", u64::from(width), longest)?;
+        Device::check("picture height, in pixels,", u64::from(height), longest)?;
+        scene.validate()?;
+        let mut rooms = HashMap::new();
+        for draw in &scene.draws {
+            rooms.entry(address(&draw.mesh)).or_insert_with(|| Room::of(&draw.mesh));
+        }
+        let rows_at_once = (band_pixels / u64::from(width)).clamp(1, u64::from(height)) as u32;
+        let mut renderer = Self {
+            shadows: request.shadows.unwrap_or(true) && request.technique.casts_shadows(),
+            rooms,
+            shared: Shared::new(&device, scene.draws.len())?,
+            draws: scene.draws.iter().map(|_| None).collect(),
+            targets: Targets::new(&device, TargetSet::of(request.aovs), width, rows_at_once)?,
+            frame: FrameBinding::new(&device, &scene)?,
+            spare: Vec::new(),
+            under_way: VecDeque::new(),
+            tickets: 0,
+            warnings: crate::warnings::warnings(&scene, &request),
+            unclaimed: Stats::default(),
+            device,
+            scene,
+            request,
+            rows_at_once,
+        };
+        renderer.unclaimed.prepare_ms = started.elapsed().as_secs_f64() * 1e3;
+        renderer.unclaimed.bytes_uploaded = Tally::now().bytes - before.bytes;
+        Ok(renderer)
+    }
+
+    /// A picture of one view. Others may be under way.
+    ///
+    /// # Errors
+    /// [`RenderError`]: a senseless camera, or the device's faults.
+    pub fn render(&mut self, camera: Camera) -> Result<Frame, RenderError> {
+        let ticket = self.start(camera)?;
+        self.finish(ticket)
+    }
+
+    /// Has the device draw a view, and returns while it does so. Each ticket takes memory for its picture until it is
+    /// finished or abandoned.
+    ///
+    /// # Errors
+    /// As [`Renderer::render`].
+    pub fn start(&mut self, camera: Camera) -> Result<Ticket, RenderError> {
+        let (started, before) = (Instant::now(), Tally::now());
+        self.device.check_process()?;
+        camera.validate()?;
+        let mut stats = std::mem::take(&mut self.unclaimed);
+        let (compiled, mut warnings) = (stats.compile_ms, self.warnings.clone());
+        let calls = self.view(&camera, &mut stats, &mut warnings)?;
+        let mut unpacker = Unpacker::new(&self.request, camera.eye)?;
+        let compiled = stats.compile_ms - compiled;
+        stats.prepare_ms += started.elapsed().as_secs_f64() * 1e3 - compiled;
+        let mut first_row = 0;
+        let band = loop {
+            let band = self.draw(&camera, &calls, first_row)?;
+            first_row += band.rows;
+            if first_row == self.request.height {
+                break band;
+            }
+            self.collect(band, &mut unpacker, &mut stats)?;
+        };
+        let spent = Tally::now();
+        stats.bytes_uploaded += spent.bytes - before.bytes;
+        stats.pipelines_compiled += spent.pipelines - before.pipelines;
+        let ticket = Ticket(self.tickets);
+        self.tickets += 1;
+        self.under_way.push_back(UnderWay { ticket, started, band, unpacker, stats, warnings });
+        Ok(ticket)
+    }
+
+    /// Waits for a picture and reads it back.
+    ///
+    /// # Errors
+    /// The device's faults, or a ticket that is not under way.
+    pub fn finish(&mut self, ticket: Ticket) -> Result<Frame, RenderError> {
+        self.device.check_process()?;
+        let Some(UnderWay { started, band, mut unpacker, mut stats, warnings, .. }) = self.take(ticket)
+        else {
+            return Err(RenderError::Scene(format!("picture {} is not under way", ticket.0)));
+        };
+        self.collect(band, &mut unpacker, &mut stats)?;
+        stats.device_clock = self.device.has_timestamps();
+        let mut frame = unpacker.finish(&mut stats);
+        stats.total_ms = started.elapsed().as_secs_f64() * 1e3;
+        frame.stats = stats;
+        frame.warnings = warnings;
+        Ok(frame)
+    }
+
+    /// Gives a picture up.
+    pub fn abandon(&mut self, ticket: Ticket) {
+        self.take(ticket);
+    }
+
+    /// Pictures of many views in turn, each read back while the next one is drawn.
+    pub fn render_many(
+        &mut self,
+        cameras: impl IntoIterator<Item = Camera>,
+    ) -> impl Iterator<Item = Result<Frame, RenderError>> {
+        let mut cameras = cameras.into_iter();
+        let mut waiting: Option<Result<Ticket, RenderError>> = None;
+        std::iter::from_fn(move || {
+            loop {
+                let next = cameras.next().map(|camera| self.start(camera));
+                let ready = std::mem::replace(&mut waiting, next);
+                match (ready, &waiting) {
+                    (Some(Ok(ticket)), _) => return Some(self.finish(ticket)),
+                    (Some(Err(error)), _) => return Some(Err(error)),
+                    (None, Some(_)) => (),
+                    (None, None) => return None,
+                }
+            }
+        })
+    }
+
+    /// The height fields that a view shows and that have not been prepared yet: what their technique reads can be baked
+    /// beforehand, with progress and where it can be interrupted.
+    pub fn fields_to_prepare(&self, camera: &Camera) -> Vec<Arc<HeightField>> {
+        let culling = self.culling(camera);
+        let unseen = |at: &usize| self.draws[*at].is_none() && self.stands(*at, camera, &culling).is_some();
+        (0..self.draws.len())
+            .filter(unseen)
+            .map(|at| Arc::clone(&self.scene.draws[at].material.field))
+            .collect()
+    }
+
+    fn take(&mut self, ticket: Ticket) -> Option<UnderWay> {
+        let at = self.under_way.iter().position(|work| work.ticket == ticket)?;
+        self.under_way.remove(at)
+    }
+
+    fn culling(&self, camera: &Camera) -> Culling {
+        Culling::new(camera, [self.request.width, self.request.height], self.request.skips)
+    }
+
+    /// How a draw stands in a view, unless it is outside.
+    fn stands(&self, at: usize, camera: &Camera, culling: &Culling) -> Option<Stand> {
+        let draw = &self.scene.draws[at];
+        let Room { middle, radius } = self.rooms.get(&address(&draw.mesh)).copied()?;
+        let relative =
+            DMat4::from_translation(-camera.eye) * draw.world_from_object * DMat4::from_translation(middle);
+        // What stays on the mesh covers the mesh, whatever depth it shows.
+        let moves = self.request.in_shell() || self.request.technique.draws_geometry();
+        let reach = if moves { f64::from(draw.material.field.extent().scale) } else { 0.0 };
+        let stand = Stand::new(relative, radius + reach, draw.material.double_sided);
+        let seen = !draw.triangles.is_empty() && !culling.misses(relative.w_axis.truncate(), stand.radius);
+        seen.then_some(stand)
+    }
+
+    /// What is drawn of a view, with its places and lights on the device.
+    fn view(
+        &mut self,
+        camera: &Camera,
+        stats: &mut Stats,
+        warnings: &mut Vec<String>,
+    ) -> Result<Vec<Call>, RenderError> {
+        let culling = self.culling(camera);
+        let mut view = ViewOf::new(&self.device, camera, &self.request, &culling);
+        let stride = self.shared.stride as usize;
+        let mut places = Vec::new();
+        for at in 0..self.draws.len() {
+            let draw = &self.scene.draws[at];
+            let Some(stand) = self.stands(at, camera, &culling) else {
+                let count = u64::from(draw.triangles.end - draw.triangles.start);
+                stats.skipped.add(crate::Skips::FRUSTUM, count);
+                continue;
+            };
+            let middle = self.rooms.get(&address(&draw.mesh)).map_or(glam::DVec3::ZERO, |room| room.middle);
+            if self.draws[at].is_none() {
+                let (request, shadows) = (&self.request, self.shadows);
+                let made = self.shared.prepare(&self.device, draw, middle, request, shadows, stats)?;
+                self.draws[at] = Some(made);
+            }
+            let Some(prepared) = &self.draws[at] else { continue };
+            if view.add(at, draw, middle, prepared, &stand, places.len() as u32, stats, warnings)? {
+                places.extend_from_slice(bytemuck::bytes_of(&place(&stand)));
+                places.resize(places.len().next_multiple_of(stride), 0);
+            }
+        }
+        stats.triangles_culled = stats.skipped.culled();
+        let lights = prepare::light_infos(&self.scene, camera.eye);
+        let lights: &[u8] = bytemuck::cast_slice(&lights);
+        tally::uploaded((lights.len() + places.len()) as u64);
+        self.device.guard("placing draws", || {
+            self.device.queue.write_buffer(&self.shared.places, 0, &places);
+            self.device.queue.write_buffer(&self.frame.lights, 0, lights);
+            Ok(())
+        })?;
+        Ok(view.calls())
+    }
+
+    /// Submits the band that begins at a row.
+    fn draw(&mut self, camera: &Camera, calls: &[Call], first_row: u32) -> Result<Band, RenderError> {
+        let rows = self.rows_at_once.min(self.request.height - first_row);
+        let readback = match self.spare.pop() {
+            Some(readback) => readback,
+            None => {
+                let set = TargetSet::of(self.request.aovs);
+                Readback::new(&self.device, set, self.request.width, self.rows_at_once)?
+            }
+        };
+        let device = &self.device;
+        let submitted = Instant::now();
+        let (drawn, copied) = device.guard("drawing", || {
+            self.frame.write(device, &self.scene, &self.request, camera, first_row, self.rows_at_once);
+            let encode = || device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            let mut encoder = encode();
+            self.encode(&mut encoder, calls, readback.timer.as_ref());
+            if let Some(timer) = &readback.timer {
+                timer.resolve(&mut encoder);
+            }
+            let drawn = device.queue.submit([encoder.finish()]);
+            let mut encoder = encode();
+            self.targets.copy(&mut encoder, rows, &readback);
+            let copied = device.queue.submit([encoder.finish()]);
+            readback.map(rows);
+            Ok((drawn, copied))
+        })?;
+        Ok(Band { readback, first_row, rows, submitted, drawn, copied })
+    }
+
+    fn encode(&self, encoder: &mut wgpu::CommandEncoder, calls: &[Call], timer: Option<&Timer>) {
+        let attachments = self.targets.color_attachments(self.scene.background);
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("surfaces"),
+            color_attachments: &attachments,
+            depth_stencil_attachment: Some(self.targets.depth_attachment()),
+            timestamp_writes: timer.map(Timer::render_writes),
+            occlusion_query_set: None,
+            multiview_mask: None,
+        });
+        pass.set_bind_group(0, &self.frame.group, &[]);
+        for call in calls {
+            if let Some(prepared) = &self.draws[call.draw] {
+                call.encode(&mut pass, prepared);
+            }
+        }
+    }
+
+    /// Waits for a band and unpacks it.
+    fn collect(&mut self, band: Band, unpacker: &mut Unpacker, stats: &mut Stats) -> Result<(), RenderError> {
+        let device = &self.device;
+        let Band { readback, first_row, rows, submitted, drawn, copied } = band;
+        stats.draw_ms += device.guard("drawing", || {
+            device.wait_for(drawn, "drawing")?;
+            let waited = submitted.elapsed().as_secs_f64() * 1e3;
+            readback.timer.as_ref().map_or(Ok(waited), |timer| timer.read_ms(device))
+        })?;
+        let before = Instant::now();
+        device.guard("reading the picture back", || {
+            device.wait_for(copied, "reading the picture back")?;
+            readback.read(rows, |target, row, bytes| unpacker.row(target, first_row + row, bytes))
+        })?;
+        stats.readback_ms += before.elapsed().as_secs_f64() * 1e3;
+        self.spare.push(readback);
+        Ok(())
+    }
+}
+
+fn place(stand: &Stand) -> DrawInfo {
+    let object_from_relative = stand.relative_from_object.inverse();
+    DrawInfo {
+        relative_from_object: stand.relative_from_object.as_mat4(),
+        object_from_relative: object_from_relative.as_mat4(),
+        eye: object_from_relative.w_axis.as_vec4(),
+    }
+}
+
+/// Group 0.
+struct FrameBinding {
+    info: wgpu::Buffer,
+    lights: wgpu::Buffer,
+    group: wgpu::BindGroup,
+}
+
+impl FrameBinding {
+    fn new(device: &Device, scene: &Scene<'_>) -> Result<Self, RenderError> {
+        let blank = FrameInfo::zeroed();
+        let info = device.buffer_with("frame", bytemuck::bytes_of(&blank), wgpu::BufferUsages::UNIFORM)?;
+        let lights = prepare::light_infos(scene, scene.camera.eye);
+        let lights =
+            device.buffer_with("lights", bytemuck::cast_slice(&lights), wgpu::BufferUsages::STORAGE)?;
+        let group = device.guard("binding the frame", || {
+            Ok(device.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("frame"),
+                layout: &device.layouts.frame,
+                entries: &[bind(0, info.as_entire_binding()), bind(1, lights.as_entire_binding())],
+            }))
+        })?;
+        Ok(Self { info, lights, group })
+    }
+
+    fn write(
+        &self,
+        device: &Device,
+        scene: &Scene<'_>,
+        request: &Request,
+        camera: &Camera,
+        first_row: u32,
+        rows: u32,
+    ) {
+        let [r, g, b] = scene.ambient;
+        let size = [request.width, request.height];
+        let directions = camera.pixel_directions(size, first_row);
+        let [corner, pixel_right, pixel_down] = directions.map(|direction| direction.extend(0.0).as_vec4());
+        let info = FrameInfo {
+            clip_from_relative: camera.clip_from_relative(size, first_row, rows).as_mat4(),
+            corner,
+            pixel_right,
+            pixel_down,
+            forward: camera.forward().extend(camera.near()).as_vec4(),
+            ambient: Vec4::new(r, g, b, 0.0),
+            light_count: scene.lights.len() as u32,
+            ..FrameInfo::zeroed()
+        };
+        tally::uploaded(size_of::<FrameInfo>() as u64);
+        device.queue.write_buffer(&self.info, 0, bytemuck::bytes_of(&info));
+    }
+}

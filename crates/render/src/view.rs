@@ -1,0 +1,149 @@
+//! What is drawn of a scene from one place, and in which order.
+
+use std::ops::Range;
+use std::sync::Arc;
+use std::time::Instant;
+
+use glam::DVec3;
+
+use crate::culling::{Culling, Stand};
+use crate::geometry::Geometry;
+use crate::micro::{self, View};
+use crate::pipeline::Pipeline;
+use crate::prepare::{Cutting, Fixed, Prepared};
+use crate::{Camera, Device, Draw, RenderError, Request, Skips, Stats};
+
+/// One program over some triangles of a draw.
+pub(crate) struct Call {
+    /// The draw's place in the scene.
+    pub draw: usize,
+    pipeline: Arc<Pipeline>,
+    geometry: Geometry,
+    runs: Vec<Range<u32>>,
+    /// Where the draw's place is in the buffer of places, bytes.
+    offset: u32,
+    /// Distances along the view axis between which the draw is.
+    span: [f64; 2],
+}
+
+impl Call {
+    /// Draws. Group 0 is set.
+    pub fn encode(&self, pass: &mut wgpu::RenderPass<'_>, prepared: &Prepared) {
+        let Pipeline::Render(pipeline) = &*self.pipeline else { return };
+        pass.set_pipeline(pipeline);
+        if let Some(field) = &prepared.field {
+            pass.set_bind_group(1, field, &[]);
+        }
+        pass.set_bind_group(2, &prepared.material, &[]);
+        pass.set_bind_group(3, &prepared.place, &[self.offset]);
+        for (slot, (_, buffer)) in self.geometry.attributes.0.iter().enumerate() {
+            pass.set_vertex_buffer(slot as u32, buffer.slice(..));
+        }
+        pass.set_index_buffer(self.geometry.indices.slice(..), wgpu::IndexFormat::Uint32);
+        for run in &self.runs {
+            pass.draw_indexed(3 * run.start..3 * run.end, 0, 0..1);
+        }
+    }
+}
+
+/// The draws of a view as they are collected.
+pub(crate) struct ViewOf<'a> {
+    device: &'a Device,
+    camera: &'a Camera,
+    request: &'a Request,
+    culling: &'a Culling,
+    calls: Vec<Call>,
+}
+
+impl<'a> ViewOf<'a> {
+    pub fn new(device: &'a Device, camera: &'a Camera, request: &'a Request, culling: &'a Culling) -> Self {
+        Self { device, camera, request, culling, calls: Vec::new() }
+    }
+
+    /// Adds what may be seen of a draw, and says whether there is anything.
+    #[expect(clippy::too_many_arguments, reason = "all that is known of a draw comes together here")]
+    pub fn add(
+        &mut self,
+        at: usize,
+        draw: &Draw<'_>,
+        middle: DVec3,
+        prepared: &Prepared,
+        stand: &Stand,
+        offset: u32,
+        stats: &mut Stats,
+        warnings: &mut Vec<String>,
+    ) -> Result<bool, RenderError> {
+        let before = self.calls.len();
+        let span = self.span(stand);
+        if let Some(Fixed { pipeline, geometry, groups, triangles }) = &prepared.fixed {
+            let runs = match groups {
+                Some(groups) => self.culling.visible(stand, groups, &mut stats.skipped),
+                None => std::iter::once(0..*triangles).collect(),
+            };
+            if !runs.is_empty() {
+                let (pipeline, geometry) = (Arc::clone(pipeline), geometry.clone());
+                self.calls.push(Call { draw: at, pipeline, geometry, runs, offset, span });
+            }
+        }
+        if let Some(Cutting { key, only_bridges }) = &prepared.cutting {
+            let view = View {
+                camera: self.camera,
+                relative_from_object: stand.relative_from_object,
+                centre: middle,
+                size: [self.request.width, self.request.height],
+                culled: self.request.skips.contains(Skips::FRUSTUM),
+            };
+            let (displaced, coarser) = micro::displaced(draw, &view, *only_bridges)?;
+            if coarser > 1.0 {
+                warnings.push(format!(
+                    "draw {at}: micro-polygons are up to {coarser:.1} pixels wide, to keep their number down"
+                ));
+            }
+            if !displaced.indices.is_empty() {
+                let started = Instant::now();
+                let pipeline = self.device.pipeline(key.clone())?;
+                stats.compile_ms += started.elapsed().as_secs_f64() * 1e3;
+                let geometry = Geometry::micro(self.device, &displaced)?;
+                let runs = std::iter::once(0..displaced.indices.len() as u32).collect();
+                self.calls.push(Call { draw: at, pipeline, geometry, runs, offset, span });
+            }
+        }
+        let added = &self.calls[before..];
+        stats.triangles_drawn +=
+            added.iter().flat_map(|call| &call.runs).map(|run| u64::from(run.end - run.start)).sum::<u64>();
+        Ok(!added.is_empty())
+    }
+
+    /// The calls in the order in which they are drawn.
+    pub fn calls(self) -> Vec<Call> {
+        let mut calls = self.calls;
+        if self.request.skips.contains(Skips::DEPTH_FIRST) {
+            nearest_first(&mut calls);
+        }
+        calls
+    }
+
+    /// Distances along the view axis between which all that a draw shows is. Without bounds for what writes a depth of
+    /// its own: no order saves a fragment of it.
+    fn span(&self, stand: &Stand) -> [f64; 2] {
+        if self.request.technique.displaces() && !self.request.technique.draws_geometry() {
+            return [f64::NEG_INFINITY, f64::INFINITY];
+        }
+        let depth = stand.relative_from_object.w_axis.truncate().dot(self.camera.forward());
+        [depth - stand.radius, depth + stand.radius]
+    }
+}
+
+/// How far ahead a draw is moved at most, to bound the work for scenes of many.
+const FARTHEST_AHEAD: usize = 256;
+
+/// Moves what is nearer ahead, so that fewer hidden fragments are lit. Only past what is wholly behind it: of surfaces
+/// at the same depth the one that comes first in the scene shows, whatever the order.
+fn nearest_first(calls: &mut [Call]) {
+    for at in 1..calls.len() {
+        let [_, far] = calls[at].span;
+        let behind = |call: &&Call| far * (1.0 + 1e-6) < call.span[0];
+        let ahead = calls[..at].iter().rev().take(FARTHEST_AHEAD).take_while(behind).count();
+        calls[at - ahead..=at].rotate_right(1);
+    }
+}
