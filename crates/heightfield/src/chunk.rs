@@ -7,13 +7,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::lanes::Lanes;
 use crate::march::texture_space_normal;
-use crate::rays::load;
 use crate::{HeightField, RayArray, Status};
 
 /// A run of rays and the places their results go.
 pub struct Chunk<'a> {
     pub(crate) origins: RayArray<'a>,
     pub(crate) directions: RayArray<'a>,
+    /// Numbers of the rays in the order in which the exact search follows them; none at all when that is the
+    /// order they have.
+    pub(crate) order: &'a [u32],
     pub(crate) from_surface: bool,
     pub(crate) cancel: Option<&'a AtomicBool>,
     pub(crate) t: Option<&'a mut [f32]>,
@@ -76,16 +78,6 @@ impl Chunk<'_> {
             let n = if hit { texture_space_normal(gradient()) } else { [f32::NAN; 3] };
             out[3 * i..3 * i + 3].copy_from_slice(&n);
         }
-    }
-
-    /// Origins and directions of a vector of rays where results depend on them, anything elsewhere.
-    #[inline(always)]
-    pub(crate) fn positions<L: Lanes>(&self, at: usize) -> ([L::D; 3], [L::D; 3]) {
-        if self.uv.is_none() && self.z.is_none() && self.normal.is_none() {
-            let nothing = [L::splat_wide(0.0); 3];
-            return (nothing, nothing);
-        }
-        (load::<L>(self.origins, at), load::<L>(self.directions, at))
     }
 
     /// Writes what the chosen rays of a vector gave, whose first is ray `at`.

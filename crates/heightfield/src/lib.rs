@@ -18,6 +18,7 @@ pub mod lanes;
 pub mod march;
 pub mod margin;
 pub mod oracle;
+mod order;
 mod packet;
 pub mod pyramid;
 pub mod ray;

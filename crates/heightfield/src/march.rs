@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use crate::chunk::Chunk;
 use crate::lanes::{self, Kernel, Lanes};
+use crate::order;
 use crate::packet;
 use crate::rays::{fault_of, first_unsound, same_count};
 use crate::search::Search;
@@ -16,7 +17,7 @@ use crate::{Status, Technique, Wrap};
 
 pub use crate::rays::validate;
 
-/// Rays handed to one task at a time.
+/// Rays handed to one task at a time, as a rule.
 const CHUNK: usize = 4096;
 
 /// How to march.
@@ -202,14 +203,18 @@ pub fn march_into(
     technique.check_maps(field)?;
     let n = origins.len();
     places.check(n)?;
+    let exact = technique.info.reads == Reads::Pyramid;
+    let order = if exact { order::squares(field, origins, directions) } else { Vec::new() };
+    let size = if order.is_empty() { CHUNK } else { order.len() };
     let chunks: Vec<Chunk<'_>> = (0..n)
-        .step_by(CHUNK)
+        .step_by(size)
         .map(|from| {
-            let to = (from + CHUNK).min(n);
+            let to = (from + size).min(n);
             let HitsMut { t, uv, z, normal, steps, status } = places.split_front(to - from);
             Chunk {
                 origins: origins.slice(from, to),
                 directions: directions.slice(from, to),
+                order: if to - from == order.len() { &order } else { &[] },
                 from_surface: options.from_surface,
                 cancel: options.cancel,
                 t,
@@ -221,14 +226,14 @@ pub fn march_into(
             }
         })
         .collect();
-    if technique.info.reads == Reads::Pyramid {
+    if exact {
         // Built here by all threads, and not while other tasks wait for it in theirs.
         field.margins();
     }
     // The first ray at fault: what lies after it need not be looked at, what lies before it must be.
     let fault = AtomicUsize::new(usize::MAX);
     chunks.into_par_iter().enumerate().try_for_each(|(at, mut chunk)| {
-        let (from, known) = (at * CHUNK, fault.load(Ordering::Relaxed));
+        let (from, known) = (at * size, fault.load(Ordering::Relaxed));
         if known < from {
             return Ok(());
         }

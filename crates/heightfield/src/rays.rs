@@ -67,33 +67,53 @@ impl<'a> RayArray<'a> {
 /// Rays `at` and on, one component a vector; the last ray stands in for those behind the end.
 #[inline(always)]
 pub(crate) fn load<L: Lanes>(rays: RayArray<'_>, at: usize) -> [L::D; 3] {
-    #[inline(always)]
-    fn split<T: Copy + Default>(rays: &[T], at: usize, width: usize) -> [[T; 16]; 3] {
-        let mut out = [[T::default(); 16]; 3];
-        let last = rays.len() / 3 - 1;
-        for i in 0..width {
-            let from = 3 * (at + i).min(last);
-            let ray = &rays[from..from + 3];
-            for (out, &x) in out.iter_mut().zip(ray) {
-                out[i] = x;
-            }
-        }
-        out
-    }
+    let last = rays.len() - 1;
     match rays {
-        RayArray::F32(rays) if rays.len() >= 3 * (at + L::WIDTH) => {
-            let [u, v, z] = L::load_triples(&rays[3 * at..]);
-            [L::widen(u), L::widen(v), L::widen(z)]
-        }
-        RayArray::F32(rays) => {
-            let [u, v, z] = split(rays, at, L::WIDTH);
-            [L::widen(L::load(&u)), L::widen(L::load(&v)), L::widen(L::load(&z))]
-        }
+        RayArray::F32(rays) if rays.len() >= 3 * (at + L::WIDTH) => split::<L>(&rays[3 * at..]),
+        RayArray::F32(rays) => split::<L>(&collect(rays, L::WIDTH, |lane| (at + lane).min(last))),
+        RayArray::F64(rays) => split_wide::<L>(&collect(rays, L::WIDTH, |lane| (at + lane).min(last))),
+    }
+}
+
+/// The rays of these numbers, one component a vector; the last of them stands in for those behind it.
+#[inline(always)]
+pub(crate) fn load_numbered<L: Lanes>(rays: RayArray<'_>, numbers: &[u32]) -> [L::D; 3] {
+    let last = numbers.len() - 1;
+    match rays {
+        RayArray::F32(rays) => split::<L>(&collect(rays, L::WIDTH, |lane| numbers[lane.min(last)] as usize)),
         RayArray::F64(rays) => {
-            let [u, v, z] = split(rays, at, L::WIDTH);
-            [L::load_wide(&u), L::load_wide(&v), L::load_wide(&z)]
+            split_wide::<L>(&collect(rays, L::WIDTH, |lane| numbers[lane.min(last)] as usize))
         }
     }
+}
+
+/// As many rays as there are lanes after one another.
+#[inline(always)]
+fn collect<T: Copy + Default>(rays: &[T], lanes: usize, ray: impl Fn(usize) -> usize) -> [T; 48] {
+    let mut out = [T::default(); 48];
+    for (lane, out) in out.chunks_exact_mut(3).take(lanes).enumerate() {
+        let from = 3 * ray(lane);
+        out.copy_from_slice(&rays[from..from + 3]);
+    }
+    out
+}
+
+#[inline(always)]
+fn split<L: Lanes>(rays: &[f32]) -> [L::D; 3] {
+    let [u, v, z] = L::load_triples(rays);
+    [L::widen(u), L::widen(v), L::widen(z)]
+}
+
+#[inline(always)]
+fn split_wide<L: Lanes>(rays: &[f64; 48]) -> [L::D; 3] {
+    let mut parts = [[0.0; 16]; 3];
+    for (lane, ray) in rays.chunks_exact(3).enumerate() {
+        for (part, &x) in parts.iter_mut().zip(ray) {
+            part[lane] = x;
+        }
+    }
+    let [u, v, z] = parts;
+    [L::load_wide(&u), L::load_wide(&v), L::load_wide(&z)]
 }
 
 /// Checks that every ray is finite and has a direction.

@@ -97,6 +97,48 @@ fn the_first_ray_at_fault_is_named_wherever_it_lies() {
 }
 
 #[test]
+fn rays_of_a_picture_find_what_each_row_finds() {
+    // The last row is cut short, and neither side is a multiple of anything.
+    let (width, rows, cut) = (203, 43, 11);
+    let place = |i: usize| ((i % width) as f32 / 190.0, (i / width) as f32 / 190.0);
+    let origins: Vec<f32> = (0..width * rows - cut).flat_map(|i| [place(i).0, place(i).1, 1.0]).collect();
+    for slope in [[0.1, 0.05], [-1.5, 0.7]] {
+        let directions: Vec<f32> = (0..origins.len() / 3)
+            .flat_map(|i| if i % 97 == 5 { [0.3, 0.2, 0.1] } else { [slope[0] + place(i).0, slope[1], -1.0] })
+            .collect();
+        for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
+            let (field, exact) = (noise(wrap), Technique::named("exact").unwrap());
+            let find = |from: usize, to: usize| {
+                let (o, d) = (&origins[3 * from..3 * to], &directions[3 * from..3 * to]);
+                let outputs =
+                    OutputSet::T | OutputSet::UV | OutputSet::Z | OutputSet::NORMAL | OutputSet::STATUS;
+                let options = MarchOptions { outputs, ..MarchOptions::default() };
+                march(&field, &exact, RayArray::F32(o), RayArray::F32(d), &options).unwrap()
+            };
+            let n = origins.len() / 3;
+            let whole = find(0, n);
+            for from in (0..n).step_by(width) {
+                let to = (from + width).min(n);
+                let row = find(from, to);
+                let part =
+                    |all: &Option<Vec<f32>>, k: usize| all.as_ref().map(|x| patterns(&x[k * from..k * to]));
+                let same = |row: &Option<Vec<f32>>| row.as_ref().map(|x| patterns(x));
+                assert_eq!(part(&whole.t, 1), same(&row.t), "{wrap:?} row {}", from / width);
+                assert_eq!(part(&whole.uv, 2), same(&row.uv));
+                assert_eq!(part(&whole.z, 1), same(&row.z));
+                assert_eq!(part(&whole.normal, 3), same(&row.normal));
+                assert_eq!(whole.status.as_ref().map(|x| &x[from..to]), row.status.as_deref());
+            }
+        }
+    }
+}
+
+/// Numbers that can be compared even if they are not one.
+fn patterns(values: &[f32]) -> Vec<u32> {
+    values.iter().map(|x| x.to_bits()).collect()
+}
+
+#[test]
 fn a_cancelled_batch_says_so() {
     let (field, rays) = (field(), rays());
     let exact = Technique::named("exact").unwrap();

@@ -22,7 +22,7 @@ const ALLOWANCE: f32 = 0.5;
 /// Level at which bundles begin, at least.
 const BEGIN: usize = 4;
 /// Level at which rays begin that have come down in a bundle, and others.
-const BEGIN_RAYS: [f32; 2] = [2.0, 5.0];
+const BEGIN_RAYS: [f32; 2] = [1.0, 5.0];
 
 /// For each bundle: least and largest x and y at drop 0, then at drop 1, in tiles.
 type Boxes = [[f32; BUNDLES]; 8];

@@ -1,9 +1,12 @@
 //! The rays of a block that still look for their hit, side by side in arrays.
 
+use std::ops::Range;
+
 use super::grid::Axis;
+use crate::HeightField;
+use crate::chunk::Chunk;
 use crate::lanes::Lanes;
-use crate::rays::load;
-use crate::{HeightField, RayArray};
+use crate::rays::{load, load_numbered};
 
 /// Rays taken into a block at a time.
 pub const BATCH: usize = 1024;
@@ -11,9 +14,6 @@ pub const BATCH: usize = 1024;
 pub const LEFT: usize = 256;
 /// Vectors may be written whole behind the last ray.
 const ROOM: usize = BATCH + LEFT + 16;
-/// Rays whose results are collected.
-pub const WINDOW: usize = 4096;
-
 /// Farthest a ray may go along an axis from lid to floor, in cells: with more, `f32` positions are off
 /// by more than the margins allow.
 const FARTHEST: f64 = (1 << 20) as f64;
@@ -47,27 +47,22 @@ pub struct Block {
     pub queue: Queue,
     /// Start x, y and direction x, y in cells, drop.
     pub double: [[f64; ROOM]; 5],
-    /// Which ray of the window.
+    /// Which ray of the chunk.
     pub ray: [i32; ROOM],
 }
 
-/// What is kept of every ray of a window.
+/// What is found out of every ray of a chunk.
 pub struct Results {
     /// Drop of the hit below the highest point; NaN for rays that need the search for one.
-    pub drop: [f64; WINDOW + 16],
+    pub drop: Vec<f64>,
     /// Nodes and cells visited.
-    pub steps: [i32; WINDOW + 16],
-    /// Drop of the origin, and ray parameter for one unit of drop.
-    pub begin: [f64; WINDOW + 16],
-    /// See `begin`.
-    pub scale: [f64; WINDOW + 16],
+    pub steps: Vec<i32>,
 }
 
 impl Results {
-    /// Nothing yet.
-    pub fn new() -> Self {
-        let zeros = [0.0; WINDOW + 16];
-        Self { drop: zeros, steps: [0; WINDOW + 16], begin: zeros, scale: zeros }
+    /// Nothing yet of so many rays. Vectors may be read whole behind the last.
+    pub fn new(rays: usize) -> Self {
+        Self { drop: vec![f64::NAN; rays + 16], steps: vec![0; rays + 16] }
     }
 }
 
@@ -77,18 +72,11 @@ impl Block {
         Self { queue: Queue::new(), double: [[0.0; ROOM]; 5], ray: [0; ROOM] }
     }
 
-    /// Takes in rays, at most [`BATCH`], the first of which is ray `first` of the window.
+    /// Takes in the rays at some places of the order, at most [`BATCH`].
     ///
     /// Rays that do not go down, or not steeply enough, are left out: their result stays as it is.
     #[inline(always)]
-    pub fn fill<L: Lanes>(
-        &mut self,
-        field: &HeightField,
-        origins: RayArray<'_>,
-        directions: RayArray<'_>,
-        first: usize,
-        results: &mut Results,
-    ) {
+    pub fn fill<L: Lanes>(&mut self, field: &HeightField, chunk: &Chunk<'_>, places: Range<usize>) {
         let size = [L::splat_wide(field.width() as f64), L::splat_wide(field.height() as f64)];
         let cells = field.cells().map(|n| L::splat_wide(n as f64));
         let inverse = field.cells().map(|n| L::splat_wide(1.0 / n as f64));
@@ -97,15 +85,24 @@ impl Block {
         let zero = L::splat_wide(0.0);
         let slack = L::splat(crate::margin::SLACK);
         let lanes: [i32; 16] = std::array::from_fn(|lane| lane as i32);
-        for at in (0..origins.len()).step_by(L::WIDTH) {
+        for at in places.clone().step_by(L::WIDTH) {
             let slot = self.queue.len;
-            let o = load::<L>(origins, at);
-            let d = load::<L>(directions, at);
+            let end = places.end.min(at + L::WIDTH);
+            let (o, d);
+            if let Some(numbers) = chunk.order.get(at..end) {
+                o = load_numbered::<L>(chunk.origins, numbers);
+                d = load_numbered::<L>(chunk.directions, numbers);
+                for (ray, &number) in self.ray[slot..].iter_mut().zip(numbers) {
+                    *ray = number as i32;
+                }
+            } else {
+                o = load::<L>(chunk.origins, at);
+                d = load::<L>(chunk.directions, at);
+                L::store_int(L::load_int(&lanes) + L::splat_int(at as i32), &mut self.ray[slot..]);
+            }
             let scale = L::splat_wide(-1.0) / d[2];
             let begin = highest - o[2];
-            L::store_wide(scale, &mut results.scale[first + at..]);
-            L::store_wide(begin, &mut results.begin[first + at..]);
-            let mut usable = L::first(origins.len() - at) & L::lt_wide(d[2], zero);
+            let mut usable = L::first(places.end - at) & L::lt_wide(d[2], zero);
             let single = &mut self.queue.single;
             for k in 0..2 {
                 let direction = d[k] * size[k] * scale;
@@ -126,7 +123,6 @@ impl Block {
             let rounded_down = L::narrow(from) - (slack + slack * L::narrow(from));
             L::store(rounded_down, &mut single[DROP][slot..]);
             L::store_wide(from, &mut self.double[FINE_DROP][slot..]);
-            L::store_int(L::load_int(&lanes) + L::splat_int((first + at) as i32), &mut self.ray[slot..]);
             L::store_int(L::splat_int(0), &mut self.queue.steps[slot..]);
             self.keep::<L>(slot, usable);
         }

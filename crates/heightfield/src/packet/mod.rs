@@ -17,12 +17,11 @@ mod cells;
 mod coarse;
 mod grid;
 
-use std::ops::Range;
-
 use crate::HeightField;
 use crate::chunk::{Chunk, Outcome};
 use crate::lanes::{Kernel, Lanes};
-use block::{BATCH, Block, LEFT, Queue, Results, WINDOW};
+use crate::rays::load;
+use block::{BATCH, Block, LEFT, Queue, Results};
 use grid::Grid;
 
 /// Rounds of coarse and fine walks without new rays, after which the rays left take the search for one.
@@ -53,41 +52,38 @@ impl Kernel for Exact<'_, '_> {
         }
         let mut block = Block::new();
         let mut bundles = Queue::new();
-        let mut results = Results::new();
-        for from in (0..n).step_by(WINDOW) {
-            let to = (from + WINDOW).min(n);
-            descend::<L>(field, chunk, from..to, &mut block, &mut bundles, &mut results);
-            if chunk.cancelled() {
-                return;
-            }
-            write::<L>(field, chunk, from, to - from, &results);
-            chunk.march_singly(field, from..to, |i| results.drop[i - from].is_nan());
+        let mut results = Results::new(n);
+        descend::<L>(field, chunk, &mut block, &mut bundles, &mut results);
+        if chunk.cancelled() {
+            return;
         }
+        write::<L>(field, chunk, &results);
+        chunk.march_singly(field, 0..n, |i| results.drop[i].is_nan());
     }
 }
 
-/// Writes the hits of `n` rays from ray `from` on.
+/// Writes the hits.
 #[inline(always)]
-fn write<L: Lanes>(field: &HeightField, chunk: &mut Chunk<'_>, from: usize, n: usize, results: &Results) {
+fn write<L: Lanes>(field: &HeightField, chunk: &mut Chunk<'_>, results: &Results) {
+    let n = chunk.origins.len();
+    let highest = L::splat_wide(f64::from(field.pyramid().highest()));
     for at in (0..n).step_by(L::WIDTH) {
+        let (origin, direction) = (load::<L>(chunk.origins, at), load::<L>(chunk.directions, at));
         let drop = L::load_wide(&results.drop[at..]);
-        let begin = L::load_wide(&results.begin[at..]);
-        let t = (drop - begin) * L::load_wide(&results.scale[at..]);
+        let t = (drop - (highest - origin[2])) * (L::splat_wide(-1.0) / direction[2]);
         // False for NaN.
         let hit = L::first(n - at) & L::le_wide(drop, drop);
         let outcome = Outcome::<L> { hit, t, steps: L::load_int(&results.steps[at..]) };
-        let (origin, direction) = chunk.positions::<L>(from + at);
-        chunk.write_all(field, from + at, hit, &outcome, origin, direction);
+        chunk.write_all(field, at, hit, &outcome, origin, direction);
     }
 }
 
-/// Finds the hits of the rays of a window. New rays are taken in while others still look, for a few that
+/// Finds the hits of the rays of a chunk. New rays are taken in while others still look, for a few that
 /// are left over would leave most lanes idle.
 #[inline(always)]
 fn descend<L: Lanes>(
     field: &HeightField,
     chunk: &Chunk<'_>,
-    range: Range<usize>,
     block: &mut Block,
     bundles: &mut Queue,
     results: &mut Results,
@@ -95,16 +91,13 @@ fn descend<L: Lanes>(
     let margins = field.margins();
     let gx = Grid::<L>::new(field.cells()[0], field.is_periodic());
     let gy = Grid::<L>::new(field.cells()[1], field.is_periodic());
-    let mut next = range.start;
-    let mut rounds = 0;
-    block.queue.len = 0;
-    results.drop.fill(f64::NAN);
+    let n = chunk.origins.len();
+    let (mut next, mut rounds) = (0, 0);
     while rounds < ROUNDS && !chunk.cancelled() {
-        if next < range.end && block.queue.len <= LEFT {
-            let to = (next + BATCH).min(range.end);
-            let (origins, directions) = (chunk.origins.slice(next, to), chunk.directions.slice(next, to));
+        if next < n && block.queue.len <= LEFT {
+            let to = (next + BATCH).min(n);
             let old = block.queue.len;
-            block.fill::<L>(field, origins, directions, next - range.start, results);
+            block.fill::<L>(field, chunk, next..to);
             beams::descend::<L>(&mut block.queue, old, bundles, margins, &gx, &gy);
             (next, rounds) = (to, 0);
         } else if block.queue.len == 0 {

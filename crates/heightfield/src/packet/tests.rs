@@ -69,6 +69,7 @@ fn every_level_finds_what_the_search_for_one_ray_finds() {
             let mut chunk = Chunk {
                 origins: RayArray::F64(&origins),
                 directions: RayArray::F64(&directions),
+                order: &[],
                 from_surface: false,
                 cancel: None,
                 t: Some(&mut t),

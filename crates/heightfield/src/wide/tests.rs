@@ -35,6 +35,7 @@ fn same_bits<S: WideSearch>(search: &S) {
             work(&mut Chunk {
                 origins: RayArray::F64(&origins),
                 directions: RayArray::F64(&directions),
+                order: &[],
                 from_surface: false,
                 cancel: None,
                 t: places.t,
