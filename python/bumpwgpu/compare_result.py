@@ -177,8 +177,10 @@ class CompareResult:
         Returns
         -------
         list of dict
-            Rows by rising time, each with ``tied_with``: labels of the others on the front whose time
-            cannot be told from its own (the quartile ranges meet).
+            Rows by rising time, each with ``tied_with``: labels of settings whose time cannot be told from
+            its own (the quartile ranges meet, or the medians are within 25 %) and that are on the front
+            too or would be, were the tie broken in their favour. On another machine they may come in its
+            place.
 
         Raises
         ------

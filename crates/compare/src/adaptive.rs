@@ -1,17 +1,22 @@
 //! The settings worth measuring, found by measuring: a quick look at a few settings of each technique,
 //! then at more of them around the Pareto front, and a thorough comparison of what is left.
 //!
-//! What another setting beats by far in time *and* error is dropped after the quick look. The rays of the
+//! The quick look goes by errors and by work, the texture reads of a ray, which are the same on every machine
+//! and in every run; only the thorough comparison goes by time. So the same settings are tried everywhere, and
+//! fronts of two machines can be held against each other. Times follow work within a quarter for all searches
+//! that read heights alone; bounds are wide enough for that and for other machines.
+//!
+//! What another setting beats by far in work *and* error is dropped after the quick look. The rays of the
 //! quick look are not those of the comparison, so nothing is chosen for having been lucky.
 
 use heightfield::HeightField;
 
 use crate::cached::truths;
-use crate::pareto::{Candidate, front};
+use crate::pareto::{Candidate, ERROR_FLOOR, contenders, front};
 use crate::run::{Tell, compare_stored};
 use crate::setting::{Format, Setting};
 use crate::stores::Stores;
-use crate::{CompareError, DeviceMarch, Plan, Row, sweep};
+use crate::{CompareError, DeviceMarch, Plan, Row, Timing, sweep};
 
 /// Most settings that get a quick look.
 pub const MOST_TRIED: usize = 80;
@@ -23,12 +28,15 @@ const PARTS: usize = 1000;
 const ROUNDS: usize = 4;
 /// Rays at each elevation of the quick look, at most.
 const QUICK_RAYS: usize = 1024;
-/// Timed repeats of the quick look.
-const QUICK_REPEATS: usize = 3;
-/// A setting is dropped when one at least this much faster ...
-const FASTER: f64 = 1.25;
+/// Quotient of work up to which either of two settings may turn out faster: a quarter that times are off from
+/// work, on a machine where another quarter lies between them.
+const SAME_WORK: f64 = 1.6;
+/// A setting is dropped when one with at most this share of its work ...
+const LESS_WORK: f64 = 0.5;
 /// ... has at most this share of its error.
 const BETTER: f64 = 0.8;
+/// Texture reads that a search is worth besides its own: setting a ray up and writing its hit.
+const SETUP_READS: f64 = 2.0;
 /// Share of rays without a right hit above which a setting cannot be on the front.
 const MOST_FAILING: f64 = 1e-3;
 
@@ -69,7 +77,7 @@ pub fn compare_adaptively(
     let quick = Plan {
         settings: Vec::new(),
         rays: plan.rays.min(QUICK_RAYS),
-        repeats: QUICK_REPEATS,
+        repeats: 1,
         seed,
         elevations_deg: plan.elevations_deg.clone(),
     };
@@ -91,8 +99,9 @@ pub fn compare_adaptively(
         look(&mut stores, &quick, &pending, device, &mut looks, &mut tell)?;
         pending = around_the_front(&looks);
     }
+    let front = front(&candidates(&looks, MOST_FAILING));
     let on_front: Vec<Setting> =
-        front_of(&looks).iter().map(|&at| looks[at].setting).filter(Setting::is_plain).collect();
+        front.iter().map(|&at| looks[at].setting).filter(Setting::is_plain).collect();
     let mut stored = Vec::new();
     for setting in on_front {
         for format in [Format::R16Float, Format::R16Unorm, Format::R8Unorm] {
@@ -137,39 +146,33 @@ fn look(
     Ok(())
 }
 
-/// The time that ranks.
-fn time(row: &Row) -> &crate::Timing {
-    row.device.as_ref().unwrap_or(&row.cpu)
+/// Texture reads of a ray: a step reads the heights, and the map besides in a search that has one.
+fn work(row: &Row) -> f64 {
+    let reads = if row.setting.technique.info.reads.baked().is_empty() { 1.0 } else { 2.0 };
+    SETUP_READS + reads * row.metrics.steps_mean
 }
 
-fn front_of(looks: &[Row]) -> Vec<usize> {
-    let candidates: Vec<Candidate> = looks
-        .iter()
-        .map(|row| Candidate {
-            time: *time(row),
+/// Settings by work in place of time.
+fn candidates(looks: &[Row], allowed: f64) -> Vec<Candidate> {
+    let spread = SAME_WORK.sqrt();
+    let of = |row: &Row| {
+        let work = work(row);
+        Candidate {
+            time: Timing { median_ns: work, low_ns: work / spread, high_ns: work * spread },
             error: row.metrics.uv_error_p99_texels,
             memory: row.memory_bytes as f64,
-            eligible: row.metrics.failure_rate() <= MOST_FAILING,
-        })
-        .collect();
-    front(&candidates)
+            eligible: row.metrics.failure_rate() <= allowed,
+        }
+    };
+    looks.iter().map(of).collect()
 }
 
-/// Neighbours of the settings on the front, and of those that would be but for a few failing rays: more
-/// steps may mend that.
+/// Neighbours of the settings on the front or tied with it, and of those that would be but for a few failing
+/// rays: more steps may mend that.
 fn around_the_front(looks: &[Row]) -> Vec<Setting> {
     let tried: Vec<_> = looks.iter().map(|row| row.setting.technique).collect();
-    let loose: Vec<Candidate> = looks
-        .iter()
-        .map(|row| Candidate {
-            time: *time(row),
-            error: row.metrics.uv_error_p99_texels,
-            memory: row.memory_bytes as f64,
-            eligible: row.metrics.failure_rate() <= 20.0 * MOST_FAILING,
-        })
-        .collect();
-    let mut wanted = front_of(looks);
-    wanted.extend(front(&loose));
+    let mut wanted = contenders(&candidates(looks, MOST_FAILING));
+    wanted.extend(contenders(&candidates(looks, 20.0 * MOST_FAILING)));
     let mut found: Vec<Setting> = Vec::new();
     for at in wanted {
         for technique in sweep::neighbours(&tried[at], &tried) {
@@ -191,9 +194,9 @@ fn beaten(looks: &[Row], at: usize) -> bool {
             return false;
         }
         let (error, least) = (row.metrics.uv_error_p99_texels, than.metrics.uv_error_p99_texels);
-        let quicker = time(than).median_ns * FASTER <= time(row).median_ns;
+        let quicker = work(than) <= LESS_WORK * work(row);
         let sounder = than.metrics.failure_rate() <= fails.max(MOST_FAILING);
-        if quicker && sounder && least <= BETTER * error {
+        if quicker && sounder && least <= (BETTER * error).max(ERROR_FLOOR) {
             return true;
         }
         // The same technique in another format of the same size.
@@ -220,7 +223,7 @@ impl Dropped {
     fn of(row: &Row) -> Self {
         Self {
             setting: row.setting,
-            time_ns: time(row).median_ns,
+            time_ns: row.device.as_ref().unwrap_or(&row.cpu).median_ns,
             uv_error_p99_texels: row.metrics.uv_error_p99_texels,
             failure_rate: row.metrics.failure_rate(),
         }

@@ -18,6 +18,19 @@ pub struct Candidate {
 
 /// Errors closer than this share are the same: percentiles of a sample are not sharper.
 const ERROR_SLACK: f64 = 1.0e-3;
+/// Errors up to this many texels are the same: what is left of an exact answer in 32 bits, which differs with
+/// the order of operations and shows nowhere.
+pub const ERROR_FLOOR: f64 = 1.0e-3;
+
+impl Candidate {
+    fn ranked_error(&self) -> f64 {
+        self.error.max(ERROR_FLOOR)
+    }
+}
+
+fn no_less_accurate(a: &Candidate, b: &Candidate) -> bool {
+    a.ranked_error() <= b.ranked_error()
+}
 
 /// Whether `a` makes `b` pointless: it is not slower beyond the spread, not less accurate, and clearly
 /// better in one of the two, or equal in both with less memory.
@@ -25,10 +38,25 @@ fn dominates(a: &Candidate, b: &Candidate) -> bool {
     if b.time.clearly_faster(&a.time) {
         return false;
     }
-    let more_accurate = a.error < b.error * (1.0 - ERROR_SLACK);
-    let better = a.error <= b.error && (more_accurate || a.time.clearly_faster(&b.time));
-    let equal = a.error <= b.error * (1.0 + ERROR_SLACK) && !a.time.clearly_faster(&b.time);
+    let more_accurate = a.ranked_error() < b.ranked_error() * (1.0 - ERROR_SLACK);
+    let better = no_less_accurate(a, b) && (more_accurate || a.time.clearly_faster(&b.time));
+    let equal = a.ranked_error() <= b.ranked_error() * (1.0 + ERROR_SLACK) && !a.time.clearly_faster(&b.time);
     better || equal && a.memory < b.memory
+}
+
+/// Whether `a` makes `b` pointless however ties in time are broken: it is clearly faster, or both were timed as
+/// one (they differ in formats alone).
+fn outclasses(a: &Candidate, b: &Candidate) -> bool {
+    if a.time == b.time { dominates(a, b) } else { no_less_accurate(a, b) && a.time.clearly_faster(&b.time) }
+}
+
+/// Indices of those that are on the front or would be, were ties in time broken in their favour.
+pub fn contenders(candidates: &[Candidate]) -> Vec<usize> {
+    let fit: Vec<usize> = (0..candidates.len())
+        .filter(|&i| candidates[i].eligible && candidates[i].error.is_finite())
+        .collect();
+    let beaten = |i: usize| fit.iter().any(|&j| j != i && outclasses(&candidates[j], &candidates[i]));
+    fit.iter().copied().filter(|&i| !beaten(i)).collect()
 }
 
 /// Indices on the Pareto front, by rising median time.
@@ -37,25 +65,22 @@ fn dominates(a: &Candidate, b: &Candidate) -> bool {
 /// while a is clearly faster than c. So candidates are taken from the most accurate one on, and only
 /// those that were kept can keep others out.
 pub fn front(candidates: &[Candidate]) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..candidates.len())
-        .filter(|&i| candidates[i].eligible && candidates[i].error.is_finite())
-        .collect();
-    let by_time = |a: usize, b: usize| candidates[a].time.median_ns.total_cmp(&candidates[b].time.median_ns);
-    order.sort_by(|&a, &b| candidates[a].error.total_cmp(&candidates[b].error).then(by_time(a, b)));
-    // An equal that needs less memory comes first, since only what was kept can keep others out.
     let at = |i: usize| &candidates[i];
-    let spared = |i: usize| {
-        let equal = |j: usize| (at(j).error - at(i).error).abs() <= ERROR_SLACK * at(i).error;
-        order.iter().any(|&j| j != i && equal(j) && at(j).memory < at(i).memory && dominates(at(j), at(i)))
-    };
-    let order: Vec<usize> = order.iter().copied().filter(|&i| !spared(i)).collect();
+    let by_time = |a: &usize, b: &usize| at(*a).time.median_ns.total_cmp(&at(*b).time.median_ns);
+    let mut order = contenders(candidates);
+    order.sort_by(|a, b| at(*a).ranked_error().total_cmp(&at(*b).ranked_error()).then_with(|| by_time(a, b)));
+    // Of equally accurate ones, those that need less memory come first.
+    let equals = |a: &usize, b: &usize| at(*b).ranked_error() <= at(*a).ranked_error() * (1.0 + ERROR_SLACK);
+    for group in order.chunk_by_mut(equals) {
+        group.sort_by(|a, b| at(*a).memory.total_cmp(&at(*b).memory).then_with(|| by_time(a, b)));
+    }
     let mut front: Vec<usize> = Vec::new();
     for i in order {
-        if !front.iter().any(|&kept| dominates(&candidates[kept], &candidates[i])) {
+        if !front.iter().any(|&kept| dominates(at(kept), at(i))) {
             front.push(i);
         }
     }
-    front.sort_by(|&a, &b| by_time(a, b));
+    front.sort_by(by_time);
     front
 }
 
@@ -97,6 +122,50 @@ mod tests {
         assert_eq!(front(&all), [1]);
         all[1].error = f64::NAN;
         assert!(front(&all).is_empty());
+    }
+
+    #[test]
+    fn what_is_left_of_exact_answers_is_no_difference() {
+        let all = [candidate(2.0, 0.0, 1e-5), candidate(1.0, 0.0, 6e-4), candidate(0.5, 0.0, 2e-3)];
+        assert_eq!(front(&all), [2, 1]);
+    }
+
+    #[test]
+    fn contenders_are_the_front_and_what_ties_with_it() {
+        // Beside the front: one that ties with its better, one that is beaten outright, one timed as its better.
+        let all = [
+            candidate(1.0, 0.0, 9.0),
+            candidate(2.0, 0.0, 1.0),
+            candidate(1.9, 0.0, 2.0),
+            candidate(4.0, 0.0, 2.0),
+            candidate(2.0, 0.0, 3.0),
+        ];
+        assert_eq!(front(&all), [0, 1]);
+        assert_eq!(contenders(&all), [0, 1, 2]);
+        assert_eq!(ties(&all, 1, &[0, 1, 2]), [2]);
+    }
+
+    #[test]
+    fn whatever_the_noise_the_front_is_among_the_contenders() {
+        let mut random = crate::rays::Random::new(9, 9);
+        for _ in 0..500 {
+            let all: Vec<Candidate> = (0..12)
+                .map(|_| {
+                    let mut unit = || random.unit();
+                    let (time, spread) = (1.0 + 2.0 * unit(), 0.4 * unit());
+                    Candidate {
+                        memory: (2.0 * unit()).round(),
+                        ..candidate(time, spread, (4.0 * unit()).round())
+                    }
+                })
+                .collect();
+            let near = contenders(&all);
+            let front = front(&all);
+            assert!(front.iter().all(|i| near.contains(i)));
+            // Each contender that is off the front ties with a member of it.
+            let tied = |i: &usize| front.contains(i) || !ties(&all, *i, &front).is_empty();
+            assert!(near.iter().all(tied));
+        }
     }
 
     #[test]

@@ -23,8 +23,9 @@ const LADDERS: &[(&str, &str, &[u32])] = &[
 /// published recipes fail.
 const ONLY_WHEN_ASKED: &[&str] = &["relaxed_cone_texel"];
 
-/// Least quotient of two values worth a third one between them.
-const LEAST_QUOTIENT: f64 = 1.3;
+/// Least quotient of two values worth a third one between them: steps nearer to each other than its root would
+/// be told apart by noise.
+const LEAST_QUOTIENT: f64 = 1.9;
 
 /// Every technique with its defaults but those that need asking for.
 ///

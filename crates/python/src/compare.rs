@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use compare::pareto::{Candidate, front, ties};
+use compare::pareto::{Candidate, contenders, front, ties};
 use compare::picture::View;
 use compare::recommend::{Budget, Entry, recommend};
 use compare::{
@@ -360,8 +360,8 @@ fn timing([low_ns, median_ns, high_ns]: [f64; 3]) -> Timing {
     Timing { median_ns, low_ns, high_ns }
 }
 
-/// Indices of the settings on the Pareto front, by rising time, each with the others on it whose time
-/// cannot be told from its own. Settings that fail on more than `max_failure_rate` of the rays cannot
+/// Indices of the settings on the Pareto front, by rising time, each with those whose time cannot be told from
+/// its own and that are on the front too or would be, were the tie broken in their favour. Settings that fail on more than `max_failure_rate` of the rays cannot
 /// be on it.
 #[pyfunction]
 pub fn compare_front(measured: Vec<Measured>, max_failure_rate: f64) -> Vec<(usize, Vec<usize>)> {
@@ -375,7 +375,8 @@ pub fn compare_front(measured: Vec<Measured>, max_failure_rate: f64) -> Vec<(usi
         })
         .collect();
     let kept = front(&candidates);
-    kept.iter().map(|&i| (i, ties(&candidates, i, &kept))).collect()
+    let near = contenders(&candidates);
+    kept.iter().map(|&i| (i, ties(&candidates, i, &near))).collect()
 }
 
 /// Index of the cheapest setting within the budget, if any, and why. The budget: p99 error in texels, share

@@ -221,7 +221,8 @@ pub enum Level {
 }
 
 impl Level {
-    /// All levels that this processor can run, the best last.
+    /// All levels that this processor can run, the best last; none above the one that the environment variable
+    /// `BUMPWGPU_SIMD` names, which stands in for a lesser processor.
     pub fn available() -> &'static [Self] {
         static AVAILABLE: OnceLock<Vec<Level>> = OnceLock::new();
         AVAILABLE.get_or_init(|| {
@@ -244,6 +245,11 @@ impl Level {
                         levels.push(Self::Avx512);
                     }
                 }
+            }
+            if let Ok(most) = std::env::var("BUMPWGPU_SIMD")
+                && let Some(at) = levels.iter().position(|level| level.name() == most)
+            {
+                levels.truncate(at + 1);
             }
             levels
         })
