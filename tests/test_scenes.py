@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import warnings
 from typing import Any
 
@@ -285,3 +288,26 @@ def test_a_renderer_warns_once() -> None:
             warnings.simplefilter("error")
             assert renderer.render().warnings
             assert len(list(renderer.render_many([renderer.camera] * 2))) == 2
+
+
+@pytest.mark.gpu
+def test_nothing_is_compiled_anew_for_another_picture() -> None:
+    # Mesa's software device compiles when it first draws, and again for each picture where a program branches
+    # on uniforms only. Without its cache on disk that takes much longer than these pictures.
+    code = """
+import bumpwgpu as bw
+bumps = bw.Material(bw.HeightMap.procedural("bricks", 32))
+for technique in ("normal", "relief", "exact", "cone", "dot3"):
+    with bw.Renderer(bw.Mesh.quad(), bumps, technique=technique, size=16) as renderer:
+        first, *others = [renderer.render().stats["draw_ms"] for _ in range(5)]
+        print(technique, first, min(others))
+"""
+    environment = {**os.environ, "MESA_SHADER_CACHE_DISABLE": "true"}
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", code],
+        env=environment, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    times = [line.split() for line in done.stdout.splitlines()]
+    assert len(times) == 5
+    for technique, first, later in times:
+        assert float(later) < max(float(first) / 4, 5.0), (technique, first, later)

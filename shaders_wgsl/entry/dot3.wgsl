@@ -33,7 +33,7 @@ fn vertex(in: VertexIn) -> Varyings {
     out.tangent = in.tangent;
     // The light vector is found here and interpolated as it is, as fixed-function hardware did.
     out.light_ts = vec3f(0.0, 0.0, 1.0);
-    if frame.light_count > 0u {
+    if light_count() > 0u {
         let light = lights[0];
         let offset = light.place.xyz - light.place.w * relative_position(in.position);
         let offset_object = normalize_or((draw.object_from_relative * vec4f(offset, 0.0)).xyz, in.normal);
@@ -55,7 +55,7 @@ fn fragment(in: Varyings, @builtin(front_facing) front: bool) -> Targets {
     let relative = relative_position(in.position);
 
     var color = albedo * frame.ambient.rgb;
-    if frame.light_count > 0u {
+    if light_count() > 0u {
         // Attenuation was a texture of its own; it is exact here.
         let light = lights[0];
         let offset = light.place.xyz - light.place.w * relative;

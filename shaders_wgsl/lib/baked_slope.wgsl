@@ -3,9 +3,10 @@
 #import "bindings/slopes.wgsl"
 #import "lib/slope_wrap.wgsl"
 #import "lib/surface_point.wgsl"
+#import "shading/branches.wgsl"
 
 fn baked_slope(point: SurfacePoint) -> vec2f {
     let slope = textureSampleGrad(slope_texture, slope_sampler, point.uv, point.uv_dx, point.uv_dy).xy;
-    let factor = slope_factor(point.uv, vec2f(material.map_width, material.map_height), material.wrap);
+    let factor = slope_factor(point.uv, vec2f(material.map_width, material.map_height), wrap_mode());
     return slope * factor * material.scale;
 }

@@ -11,7 +11,8 @@
 
 // With `relaxed` the buffer holds the relaxed cones behind the empty ones.
 fn walk(start: vec3f, delta: vec3f, from_surface: bool, most_steps: i32, relaxed: bool, halvings: i32) -> Found {
-    let periodic = height_info.wrap != 1u;
+    // At most 2. Mesa 22.3 compiles anew for each picture what branches on uniforms only; see shading/branches.wgsl.
+    let periodic = min(height_info.wrap, arrayLength(&corners)) != 1u;
     let direction = vec3f(delta.xy * height_info.size, delta.z);
     let dz = direction.z;
     if !(max(abs(direction.x), abs(direction.y)) < FARTHEST) {

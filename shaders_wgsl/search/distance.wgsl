@@ -12,13 +12,19 @@ override steps: i32 = 16384;
 // What rounding of the position costs a step, as a share of the way that the ray came, and of the step.
 const DRIFT: f32 = 9.5e-7;
 
+// At most 2. Mesa 22.3 compiles anew for each picture what branches on uniforms only; see shading/branches.wgsl.
+fn cell_wrap() -> u32 {
+    return min(height_info.wrap, arrayLength(&corners));
+}
+
 // The texel of `n` whose footprint holds a point of a cell.
 fn footprint(cell: u32, local: f32, n: i32) -> i32 {
     let nearest = i32(cell) + height_info.first_texel + select(0, 1, local >= 0.5);
-    if height_info.wrap == 1u {
+    let wrap = cell_wrap();
+    if wrap == 1u {
         return clamp(nearest, 0, n - 1);
     }
-    if height_info.wrap == 0u {
+    if wrap == 0u {
         return nearest % n;
     }
     let place = nearest % (2 * n);
@@ -36,7 +42,7 @@ fn least_distance(cell: vec2u, local: vec2f, z: f32) -> f32 {
 }
 
 fn trace(start: vec3f, delta: vec3f, from_surface: bool) -> Found {
-    let periodic = height_info.wrap != 1u;
+    let periodic = cell_wrap() != 1u;
     let direction = vec3f(delta.xy * height_info.size, delta.z);
     let dz = direction.z;
     if !(max(abs(direction.x), abs(direction.y)) < FARTHEST) {

@@ -4,6 +4,7 @@
 #import "bindings/material.wgsl"
 #import "lib/blinn_phong.wgsl"
 #import "lib/normalize.wgsl"
+#import "shading/branches.wgsl"
 
 struct Lit {
     color: vec3f,          // linear
@@ -18,7 +19,8 @@ fn lit(albedo: vec3f, position: vec3f, normal: vec3f, point: ShadowPoint) -> Lit
     result.color = albedo * frame.ambient.rgb;
     var facing = 0u;
     var blocked = 0.0;
-    for (var i = 0u; i < frame.light_count; i++) {
+    let count = light_count();
+    for (var i = 0u; i < count; i++) {
         let light = lights[i];
         let distant = light.place.w == 0.0;
         let offset = light.place.xyz - light.place.w * position;

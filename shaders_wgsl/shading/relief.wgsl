@@ -2,6 +2,7 @@
 #import "lib/found.wgsl"
 #import "lib/texture_ray.wgsl"
 #import "shading/shadow_search.wgsl"
+#import "shading/branches.wgsl"
 #import "shading/relief_targets.wgsl"
 #import "shading/shade.wgsl"
 #import "lib/surface_point.wgsl"
@@ -14,7 +15,7 @@ const SHADOW_LIFT: f32 = 1.0 / 65536.0;
 fn shade_relief(position: vec3f, point: SurfacePoint) -> ReliefTargets {
     let direction = position - draw.eye.xyz;
     let ray = texture_ray(
-        point.surface, direction, point.uv, material.scale, material.base, material.period);
+        point.surface, direction, point.uv, material.scale, material.base, tile_period());
     // Pixels drawn only for their neighbours' derivatives may read zeros from buffers, the 1 behind the eye among
     // them. Marched, they would follow a wrong ray over ground of height 0 for as long as the search lets them.
     var found = found_left(0u);

@@ -9,6 +9,7 @@
 #import "lib/emerge.wgsl"
 #import "lib/prism.wgsl"
 #import "search/exact.wgsl"
+#import "shading/branches.wgsl"
 
 // How far a chord may be from the curve, in texels and in heights.
 const SAG: vec2f = vec2f(0.02, 5e-4);
@@ -95,8 +96,8 @@ fn through_prism(ray: ShellRay, shell_prism: ShellPrism, best: ShellHit) -> Shel
             end = in_texture(there, uvs, prism);
         }
         // No branch on what is the same for the whole draw: Mesa 22.3 takes such branches out of loops, and fails.
-        let periodic = material.period > 0.0;
-        let tile = floor(start.xy / select(1.0, material.period, periodic)) * material.period;
+        let period = tile_period();
+        let tile = floor(start.xy / select(1.0, period, period > 0.0)) * period;
         let home = start - vec3f(tile, 0.0);
         let delta = end - start;
         var found: Found;

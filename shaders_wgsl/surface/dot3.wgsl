@@ -6,11 +6,12 @@
 #import "bindings/normalization_cube.wgsl"
 #import "lib/dot3.wgsl"
 #import "lib/slope_wrap.wgsl"
+#import "shading/branches.wgsl"
 
 // The 8-bit normal at `uv`, each component n * 0.5 + 0.5.
 fn stored_normal(uv: vec2f, uv_dx: vec2f, uv_dy: vec2f) -> vec3f {
     let normal = textureSampleGrad(normal_texture, normal_sampler, uv, uv_dx, uv_dy).xyz;
-    if material.wrap == WRAP_MIRROR {
+    if wrap_mode() == WRAP_MIRROR {
         let factor = slope_factor(uv, vec2f(textureDimensions(normal_texture)), WRAP_MIRROR);
         return vec3f((normal.xy - 0.5) * factor + 0.5, normal.z);
     }
