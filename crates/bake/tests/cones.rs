@@ -186,6 +186,58 @@ fn relaxed_cones_are_wider_on_smooth_slopes() {
     assert!(wider > 400, "{wider} of 4096 are wider by a fifth");
 }
 
+/// The steepest rise from around a texel to where the surface falls outwards, among points half a texel apart;
+/// those on borders between cells count a little farther out.
+fn falling(field: &HeightField, [i, j]: [i64; 2]) -> f64 {
+    let size = [field.width() as i64, field.height() as i64];
+    let half = size.map(|n| 0.5 / n as f64);
+    let place = |at: [i64; 2]| [at[0] as f64 * half[0], at[1] as f64 * half[1]];
+    let middle = [i, j].map(|at| 2 * at + 1);
+    let from = (0..25).map(|k| place([middle[0] + k % 5 - 2, middle[1] + k / 5 - 2]));
+    let from: Vec<_> = from.map(|x| (x, height(field, x))).collect();
+    let mut steepest = 1.0_f64;
+    let reach = size.map(|n| n * 3 / 2);
+    for b in middle[1] - reach[1]..=middle[1] + reach[1] {
+        for a in middle[0] - reach[0]..=middle[0] + reach[0] {
+            let y = place([a, b]);
+            let high = height(field, y);
+            for (x, low) in &from {
+                let (u, v, rise) = (y[0] - x[0], y[1] - x[1], high - low);
+                if rise > 0.0 && rise * rise > steepest * steepest * (u * u + v * v) {
+                    let away = u.hypot(v);
+                    let behind = [y[0] + 1e-6 * u / away, y[1] + 1e-6 * v / away];
+                    if height(field, behind) < high {
+                        steepest = rise / away;
+                    }
+                }
+            }
+        }
+    }
+    steepest
+}
+
+#[test]
+fn relaxed_cones_are_nearly_as_wide_as_they_may_be_on_smooth_ground() {
+    for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
+        let (w, h) = (200, 150);
+        let field = waves(w, h, wrap);
+        let map = relaxed(&field, ConeMode::Conservative);
+        let mut narrower: Vec<f64> = (0..16)
+            .map(|k| {
+                let at = k * 7919 % (w * h);
+                let widest = 1.0 / falling(&field, [(at % w) as i64, (at / w) as i64]);
+                let ratio = f64::from(map[at]);
+                assert!(ratio <= widest * (1.0 + 1e-6), "{wrap:?} {at}: {ratio} may be {widest}");
+                1.0 - ratio / widest
+            })
+            .collect();
+        narrower.sort_by(f64::total_cmp);
+        println!("{wrap:?}: narrower by {narrower:.4?}");
+        // Creases, as on the border of a clamped map, are bounded less closely.
+        assert!(narrower[8] < 0.01 && narrower[13] < 0.04, "{wrap:?}");
+    }
+}
+
 /// The published construction for one texel: from over it down through each other texel to the floor, in 128
 /// equal parts behind that; the ratio to the first that lies more than `margin` above the surface.
 fn published(field: &HeightField, [i, j]: [i64; 2], margin: f64) -> f64 {

@@ -73,8 +73,8 @@ struct Level {
     tiles: Vec<Tile>,
 }
 
-/// The level of the squares that a block collects, if there are so many: four by four tiles.
-const GROUP: usize = 2;
+/// Nodes to look into: level, node, and the first site of its period.
+pub(super) type Stack = Vec<(usize, [usize; 2], [i64; 2])>;
 
 /// See the module.
 pub(super) struct Grid<'a> {
@@ -87,13 +87,6 @@ pub(super) struct Grid<'a> {
     corners: &'a [f32],
     stride: usize,
     levels: Vec<Level>,
-}
-
-/// Inclusive ranges of sites along both axes; positions may lie on other periods of the map.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Block {
-    pub first: [i64; 2],
-    pub last: [i64; 2],
 }
 
 impl<'a> Grid<'a> {
@@ -246,7 +239,7 @@ impl<'a> Grid<'a> {
 
     /// The whole map and, if it is periodic, its images around it.
     #[inline(always)]
-    pub fn roots(&self, stack: &mut Vec<(usize, [usize; 2], [i64; 2])>) {
+    pub fn roots(&self, stack: &mut Stack) {
         let images = if self.periodic { -1..=1 } else { 0..=0 };
         for y in images.clone() {
             for x in images.clone() {
@@ -258,13 +251,7 @@ impl<'a> Grid<'a> {
 
     /// The parts of a node.
     #[inline(always)]
-    pub fn children(
-        &self,
-        level: usize,
-        node: [usize; 2],
-        origin: [i64; 2],
-        stack: &mut Vec<(usize, [usize; 2], [i64; 2])>,
-    ) {
+    pub fn children(&self, level: usize, node: [usize; 2], origin: [i64; 2], stack: &mut Stack) {
         let nodes = self.levels[level - 1].nodes;
         for b in [2 * node[1], 2 * node[1] + 1] {
             for a in [2 * node[0], 2 * node[0] + 1] {
@@ -281,68 +268,6 @@ impl<'a> Grid<'a> {
         let first = node.map(|n| ((n << level) * TILE) as i64);
         let last = [0, 1].map(|axis| ((((node[axis] + 1) << level) * TILE).min(self.sites[axis])) as i64 - 1);
         [first, last]
-    }
-
-    /// Calls `visit(tile, first, last)` for the tiles of a group that [`Self::groups_above`] gave.
-    pub fn tiles_of(
-        &self,
-        first: [i64; 2],
-        last: [i64; 2],
-        mut visit: impl FnMut(&Tile, [i64; 2], [i64; 2]),
-    ) {
-        let tile = TILE as i64;
-        let origin = [0, 1].map(|axis| first[axis] - first[axis].rem_euclid(self.sites[axis] as i64));
-        let range = |axis: usize| (first[axis] - origin[axis]) / tile..=(last[axis] - origin[axis]) / tile;
-        for b in range(1) {
-            for a in range(0) {
-                let node = [a as usize, b as usize];
-                let [from, to] = self.sites_of(0, node);
-                let place = |site: [i64; 2]| [site[0] + origin[0], site[1] + origin[1]];
-                visit(self.levels[0].tile(node), place(from), place(to));
-            }
-        }
-    }
-
-    /// Calls `visit(group, first, last)` for the squares of tiles that may hold a point to which the surface rises from
-    /// some site of the block with more than the slope known for it. `first` and `last` are the tile's
-    /// sites; `lows` and `slopes` have the lowest corner and that slope for each site of the block.
-    pub fn groups_above(
-        &self,
-        block: &Block,
-        lows: &[f32],
-        slopes: &[f32],
-        stack: &mut Vec<(usize, [usize; 2], [i64; 2])>,
-        mut visit: impl FnMut(&Tile, [i64; 2], [i64; 2]),
-    ) {
-        let top = self.levels.len() - 1;
-        let group = GROUP.min(top);
-        stack.clear();
-        self.roots(stack);
-        while let Some((at, node, origin)) = stack.pop() {
-            let tile = self.levels[at].tile(node);
-            let [first, last] =
-                self.sites_of(at, node).map(|site| [site[0] + origin[0], site[1] + origin[1]]);
-            let mut distance = 0.0;
-            for axis in 0..2 {
-                let gap = (first[axis] - block.last[axis]).max(block.first[axis] - last[axis]) as f32;
-                let gap = (gap - self.extent).max(0.0) * self.step[axis];
-                distance += gap * gap;
-            }
-            let distance = distance.sqrt();
-            // All of them, without a way out, are looked at faster than the first that matters.
-            let matters = lows
-                .iter()
-                .zip(slopes)
-                .fold(false, |matters, (&low, &slope)| matters | (tile.max - low > slope * distance));
-            if !matters {
-                continue;
-            }
-            if at == group {
-                visit(tile, first, last);
-                continue;
-            }
-            self.children(at, node, origin, stack);
-        }
     }
 }
 

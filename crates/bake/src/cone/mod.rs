@@ -18,8 +18,8 @@
 //!
 //! For relaxed cones only those `y` count at which the surface falls along the way from `x`: a ray that left the axis
 //! above the surface and is below it can come out again only at such a point, and the cone holds none. Their slopes are
-//! bounds, not exact: `near` has the one for `y` next to the cell of `x`, `pair` that for all others. Where the
-//! empty cone is as wide it takes their place, as it is pierced by no ray at all.
+//! bounds, close but not exact: see `falling`. Where the empty cone is as wide it takes their place, as it is
+//! pierced by no ray at all.
 //!
 //! [`ConeMode::Texel`]: the definitions as published. The plain cone of a texel's centre holds no other
 //! texel's centre (Dummer 2006); the relaxed one comes from rays through other texels, sampled at equal steps
@@ -33,11 +33,8 @@
 //! Robert Ban, Gabor Valasek, Csaba Balint and Viktor Vad, Robust Cone Step Mapping, EGSR 2024.
 
 mod exact;
+mod falling;
 mod grid;
-mod near;
-mod pair;
-mod rules;
-mod search;
 
 use heightfield::HeightField;
 use rayon::prelude::*;
@@ -45,9 +42,6 @@ use rayon::prelude::*;
 use crate::encode::Range;
 use crate::maps::{self, Channel, Form, Kind, Layer, Map, MapInfo, MapOption, Options, Plan};
 use crate::{BakeError, Progress};
-use grid::{Grid, Sites};
-use rules::{EmptyTexel, Falling, FallingTexel};
-use search::{Rule, steepest_rises};
 
 /// What the ratios of a cone map promise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -58,9 +52,6 @@ pub enum ConeMode {
     /// As published, for comparison.
     Texel,
 }
-
-/// Bytes a cell that a bake by rules needs besides its result: slopes, tiles and the pyramid over them.
-const RULES_BYTES: u128 = 16;
 
 const MODE: MapOption = MapOption {
     name: "mode",
@@ -131,8 +122,7 @@ pub static RELAXED_CONE: Map = Map {
 };
 
 fn plan(grid: maps::Grid, _options: &Options) -> Plan {
-    let cells: u128 = grid.cells().map(|n| n as u128 + 1).iter().product();
-    Plan::single(grid).working((cells * RULES_BYTES).max(exact::working_bytes(grid)))
+    Plan::single(grid).working(exact::working_bytes(grid).max(falling::working_bytes(grid)))
 }
 
 /// Relative rounding of a slope, all steps together.
@@ -142,11 +132,15 @@ const ROUNDING: f64 = 4e-7;
 ///
 /// # Errors
 /// [`BakeError::Interrupted`].
-pub fn cone_map(field: &HeightField, mode: ConeMode, progress: Progress<'_>) -> Result<Vec<f32>, BakeError> {
-    match mode {
-        ConeMode::Conservative => exact_map(field, progress),
-        ConeMode::Texel => at_texels(field, &EmptyTexel, progress),
-    }
+pub fn cone_map(
+    field: &HeightField,
+    mode: ConeMode,
+    mut progress: Progress<'_>,
+) -> Result<Vec<f32>, BakeError> {
+    Ok(ratios(match mode {
+        ConeMode::Conservative => exact::steepest_rises(field, &mut progress)?,
+        ConeMode::Texel => exact::steepest_between_texels(field, &mut progress)?,
+    }))
 }
 
 /// Ratios of cones that a ray pierces at most once, one a texel, row by row.
@@ -156,30 +150,24 @@ pub fn cone_map(field: &HeightField, mode: ConeMode, progress: Progress<'_>) -> 
 pub fn relaxed_cone_map(
     field: &HeightField,
     mode: ConeMode,
-    progress: Progress<'_>,
+    mut progress: Progress<'_>,
 ) -> Result<Vec<f32>, BakeError> {
-    match mode {
-        ConeMode::Conservative => wider_map(field, progress),
-        ConeMode::Texel => at_texels(field, &FallingTexel { field }, progress),
+    if mode == ConeMode::Texel {
+        return Ok(ratios(falling::steepest_between_texels(field, &mut progress)?));
     }
-}
-
-fn exact_map(field: &HeightField, mut progress: Progress<'_>) -> Result<Vec<f32>, BakeError> {
-    let mut map = exact::steepest_rises(field, &mut progress)?;
-    map.par_iter_mut().for_each(|value| *value = ratio(*value));
-    Ok(map)
-}
-
-/// Relaxed cones, and empty ones where those are wider.
-fn wider_map(field: &HeightField, mut progress: Progress<'_>) -> Result<Vec<f32>, BakeError> {
     let rows = field.height();
     let mut half = |second: usize, done: usize, total: usize| {
         progress.report(second * rows + done * rows / total.max(1), 2 * rows).is_ok()
     };
-    let empty = exact_map(field, Progress::new(&mut |done, total| half(0, done, total)))?;
-    let mut map = around_texels(field, &Falling, Progress::new(&mut |done, total| half(1, done, total)))?;
-    map.par_iter_mut().zip(empty).for_each(|(value, empty)| *value = value.max(empty));
-    Ok(map)
+    let empty = exact::steepest_rises(field, &mut Progress::new(&mut |done, total| half(0, done, total)))?;
+    let mut second = |done, total| half(1, done, total);
+    Ok(ratios(falling::steepest_rises(field, empty, &mut Progress::new(&mut second))?))
+}
+
+/// Slopes as the ratios of their cones.
+fn ratios(mut slopes: Vec<f32>) -> Vec<f32> {
+    slopes.par_iter_mut().for_each(|value| *value = ratio(*value));
+    slopes
 }
 
 /// The ratio whose cone has this slope, rounded down, at most 1.
@@ -187,44 +175,4 @@ fn ratio(slope: f32) -> f32 {
     let exact = ((1.0 - ROUNDING) / f64::from(slope)).min(1.0);
     let near = exact as f32;
     if f64::from(near) > exact { near.next_down() } else { near }
-}
-
-fn at_texels<R: Rule>(
-    field: &HeightField,
-    rule: &R,
-    mut progress: Progress<'_>,
-) -> Result<Vec<f32>, BakeError> {
-    let grid = Grid::new(field, Sites::Texels);
-    let first = -field.first_texel();
-    let size = [field.width(), field.height()];
-    let mut map = steepest_rises(&grid, rule, [first; 2], size, &mut progress)?;
-    map.par_iter_mut().for_each(|value| *value = ratio_above_one(*value));
-    Ok(map)
-}
-
-/// As [`ratio`]; slope 1 stands for all that are not steeper.
-fn ratio_above_one(slope: f32) -> f32 {
-    if slope <= 1.0 { 1.0 } else { ratio(slope) }
-}
-
-/// Each texel gets the least ratio of the four cells around it.
-fn around_texels<R: Rule>(
-    field: &HeightField,
-    rule: &R,
-    mut progress: Progress<'_>,
-) -> Result<Vec<f32>, BakeError> {
-    let grid = Grid::new(field, Sites::Cells);
-    let (width, height) = (field.width(), field.height());
-    // The cell before the first texel and all up to the one behind the last.
-    let first = -1 - field.first_texel();
-    let slopes = steepest_rises(&grid, rule, [first; 2], [width + 1, height + 1], &mut progress)?;
-    let mut map = vec![0.0_f32; width * height];
-    map.par_chunks_mut(width).enumerate().for_each(|(j, row)| {
-        let upper = &slopes[j * (width + 1)..][..width + 1];
-        let lower = &slopes[(j + 1) * (width + 1)..][..width + 1];
-        for (i, value) in row.iter_mut().enumerate() {
-            *value = ratio_above_one(upper[i].max(upper[i + 1]).max(lower[i].max(lower[i + 1])));
-        }
-    });
-    Ok(map)
 }

@@ -3,7 +3,7 @@
 use heightfield::HeightField;
 
 /// Rows are padded to multiples of this, the most lanes there are.
-pub(super) const ROUND: usize = 16;
+pub(in super::super) const ROUND: usize = 16;
 
 /// Texels that the margin holds on each side, besides room for lanes on the right.
 pub(super) const MARGIN: i64 = NEAR + 2;
@@ -12,7 +12,7 @@ pub(super) const MARGIN: i64 = NEAR + 2;
 pub(super) const NEAR: i64 = 8;
 
 /// See the module.
-pub(super) struct Lattice {
+pub(in super::super) struct Lattice {
     heights: Vec<f32>,
     stride: usize,
 }
@@ -41,7 +41,7 @@ impl Lattice {
 }
 
 /// Numbers by texel, from column and row -1 to the one behind the last; rows are padded for lanes.
-pub(super) struct Plane {
+pub(in super::super) struct Plane {
     pub stride: usize,
     pub values: Vec<f32>,
 }

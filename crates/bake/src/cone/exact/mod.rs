@@ -21,7 +21,7 @@
 //! The rest is branch and bound over tiles, with [`packet::Packet`] for as many apexes side by side as the processor
 //! has lanes. Tests are in single precision, with a margin; what passes them is worked out in double precision.
 
-mod lattice;
+pub(super) mod lattice;
 mod local;
 mod packet;
 mod pairs;
@@ -30,11 +30,11 @@ use heightfield::HeightField;
 use heightfield::lanes::{Kernel, Lanes, Level, dispatch_at};
 use rayon::prelude::*;
 
-use super::grid::{Grid, Sites};
+use super::grid::{Grid, Sites, Stack};
 use crate::{BakeError, Progress, maps};
 use lattice::{Lattice, MARGIN, Plane, ROUND};
 use local::{ToCells, ToTexels};
-use packet::{From, NOBODY, Packet, Stack};
+use packet::{From, NOBODY, Packet};
 
 /// Bytes that a bake needs besides its result.
 pub(super) fn working_bytes(grid: maps::Grid) -> u128 {
@@ -50,7 +50,7 @@ const STRIP: usize = 32;
 const BATCH: usize = 8;
 
 /// A slope that stands for all that are not steeper: a bit less than 1, so that what rounds to 1 is found.
-const FLATTEST: f32 = 1.0 - 1e-6;
+pub(super) const FLATTEST: f32 = 1.0 - 1e-6;
 
 /// The steepest rises, one a texel, row by row; at least [`FLATTEST`].
 pub(super) fn steepest_rises(
@@ -94,6 +94,36 @@ fn steepest_rises_at(
     }
     let rows = (0..height as i64).flat_map(|j| texels.row(j)[1..][..width].iter());
     Ok(rows.map(|&slope| slope.max(FLATTEST)).collect())
+}
+
+/// The steepest rises between texel centres, one a texel, row by row; at least [`FLATTEST`].
+pub(super) fn steepest_between_texels(
+    field: &HeightField,
+    progress: &mut Progress<'_>,
+) -> Result<Vec<f32>, BakeError> {
+    let (width, height) = (field.width(), field.height());
+    let job = Job {
+        level: Level::best(),
+        grid: &Grid::new(field, Sites::Texels),
+        lattice: &Lattice::new(field),
+        first: -field.first_texel(),
+    };
+    let mut progress = Rows { progress, done: 0, total: height + 2 };
+    progress.add(0)?;
+    let mut texels = Plane::new(width, height, f32::INFINITY);
+    let step = [width, height].map(|n| 1.0 / n as f64);
+    let lattice = job.lattice;
+    texels.rows_mut(|row, out| {
+        if (0..height as i64).contains(&row) {
+            dispatch_at(job.level, ToTexels { lattice, step, row, out });
+            out[0] = f32::INFINITY;
+            out[1..][..width].iter_mut().for_each(|slope| *slope = slope.max(FLATTEST));
+            out[width + 1..].fill(f32::INFINITY);
+        }
+    });
+    job.search(From::Texels, &mut texels, None, &mut progress)?;
+    let rows = (0..height as i64).flat_map(|j| texels.row(j)[1..][..width].iter());
+    Ok(rows.copied().collect())
 }
 
 /// Offsets of a texel's neighbours.
@@ -209,7 +239,7 @@ impl Kernel for Strip<'_> {
         let mut stack = Stack::new();
         let mut partners = vec![NOBODY; stride];
         let way = match from {
-            From::Points => [0, 0],
+            From::Points | From::Texels => [0, 0],
             From::Edges(0) => [1, 0],
             From::Edges(_) => [0, 1],
         };
@@ -228,7 +258,7 @@ impl Kernel for Strip<'_> {
                 };
                 let site = [i + first, j + first];
                 let mut packet = Packet::<L>::new(grid, from, site, heights, slopes, reach);
-                if from == From::Points {
+                if matches!(from, From::Points | From::Texels) {
                     for lane in 0..L::WIDTH {
                         let above = partners[column + lane];
                         let partner = if above == NOBODY { beside } else { above };

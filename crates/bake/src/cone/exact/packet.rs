@@ -2,7 +2,7 @@
 
 use heightfield::lanes::Lanes;
 
-use super::super::grid::{Bounds, Grid, Node, Tile};
+use super::super::grid::{Bounds, Grid, Node, Stack, Tile};
 use super::pairs::{to_cell, to_edge};
 
 /// What a distance may be too long by through rounding, UV units.
@@ -17,6 +17,8 @@ const MOST: usize = 16;
 pub(super) enum From {
     /// Texel centres; they rise to any point of the surface.
     Points,
+    /// Texel centres; they rise to texel centres. Sites of the grid are those.
+    Texels,
     /// Edges to the next texel along an axis; they rise to texel centres.
     Edges(usize),
 }
@@ -45,9 +47,6 @@ pub(super) struct Packet<'a, L: Lanes> {
 
 /// No partner.
 pub(super) const NOBODY: [i32; 2] = [i32::MAX; 2];
-
-/// Nodes to look into: level, node, and the first site of its period.
-pub(super) type Stack = Vec<(usize, [usize; 2], [i64; 2])>;
 
 impl<'a, L: Lanes> Packet<'a, L> {
     /// Apexes from site `first` on. `heights` are those of their ends, `slopes` what they have to exceed, and
@@ -96,7 +95,11 @@ impl<'a, L: Lanes> Packet<'a, L> {
         for [x, y] in [[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]] {
             let site = [i64::from(site[0] + x), i64::from(site[1] + y)];
             let heights = self.grid.heights(self.grid.wrap(site));
-            self.improve(lane, site, heights);
+            if self.from == From::Texels {
+                self.improve_centre(lane, site, heights[0]);
+            } else {
+                self.improve(lane, site, heights);
+            }
         }
     }
 
@@ -120,6 +123,7 @@ impl<'a, L: Lanes> Packet<'a, L> {
             }
             let found = match self.from {
                 From::Points => self.cells(first, last, origin, slope),
+                From::Texels => self.centres(first, last, origin, slope),
                 From::Edges(axis) => self.texels(axis, [first, last], origin, slope, tile),
             };
             if found {
@@ -224,6 +228,46 @@ impl<'a, L: Lanes> Packet<'a, L> {
             self.partners[lane] = site.map(|at| at as i32);
         }
         found > known
+    }
+
+    /// Tries the texels of a tile; tells whether one was steeper.
+    #[inline(always)]
+    fn centres(&mut self, first: [i64; 2], last: [i64; 2], origin: [i64; 2], mut slope: L::F) -> bool {
+        let [du, dv] = self.grid.step;
+        let zero = L::splat(0.0);
+        let mut any = false;
+        for j in first[1]..=last[1] {
+            let vy = (j + origin[1] - self.first[1]) as f32 * dv;
+            for i in first[0]..=last[0] {
+                let height = self.grid.heights([i as usize, j as usize])[0];
+                let rise = L::splat(height) - self.heights[0];
+                let vx = L::splat((i + origin[0] - self.first[0]) as f32 * du) - self.u;
+                let square = vx * vx + L::splat(vy * vy);
+                let mut lanes = L::bits(L::lt(zero, rise) & L::le(slope * slope * square, rise * rise));
+                let site = [i + origin[0], j + origin[1]];
+                let mut found = false;
+                while lanes != 0 {
+                    found |= self.improve_centre(lanes.trailing_zeros() as usize, site, height);
+                    lanes &= lanes - 1;
+                }
+                if found {
+                    any = true;
+                    slope = self.asked();
+                }
+            }
+        }
+        any
+    }
+
+    /// Tries one texel for one lane; tells whether it was steeper.
+    fn improve_centre(&mut self, lane: usize, site: [i64; 2], height: f32) -> bool {
+        let step = self.grid.step.map(f64::from);
+        let u = (site[0] - self.first[0] - lane as i64) as f64 * step[0];
+        let v = (site[1] - self.first[1]) as f64 * step[1];
+        let known = f64::from(self.slopes[lane]);
+        let (rise, distance) = (f64::from(height) - f64::from(self.ends[0][lane]), u.hypot(v));
+        let found = if rise > 0.0 && distance > 0.0 { rise / distance } else { 0.0 };
+        self.keep(lane, site, found, known)
     }
 
     /// Tries the texels of a tile as what edges along `axis` rise to; tells whether one was steeper.
