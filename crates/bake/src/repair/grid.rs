@@ -22,6 +22,7 @@ impl Grid {
     }
 
     /// A row of a plane.
+    #[inline(always)]
     pub fn row(self, plane: &[f32], j: usize) -> &[f32] {
         &plane[j * self.size[0]..][..self.size[0]]
     }
@@ -34,6 +35,7 @@ impl Grid {
     }
 
     /// The rows above and below, round the edge whether periodic or not.
+    #[inline(always)]
     pub fn around(self, j: usize) -> (usize, usize) {
         let rows = self.size[1];
         ((j + rows - 1) % rows, (j + 1) % rows)
@@ -88,6 +90,7 @@ impl Grid {
 }
 
 /// Second differences along a row, round its ends.
+#[inline(always)]
 pub(super) fn second(row: &[f32], out: &mut [f32]) {
     let n = row.len();
     for (out, window) in out[1.min(n)..].iter_mut().zip(row.windows(3)) {
@@ -99,6 +102,7 @@ pub(super) fn second(row: &[f32], out: &mut [f32]) {
 }
 
 /// Second differences across three rows.
+#[inline(always)]
 pub(super) fn second_across(above: &[f32], here: &[f32], below: &[f32], out: &mut [f32]) {
     for (((out, a), h), b) in out.iter_mut().zip(above).zip(here).zip(below) {
         *out = (a - h) + (b - h);
@@ -106,6 +110,7 @@ pub(super) fn second_across(above: &[f32], here: &[f32], below: &[f32], out: &mu
 }
 
 /// Mixed differences between a row and the one below, and to the right, round the end.
+#[inline(always)]
 pub(super) fn mixed(here: &[f32], below: &[f32], out: &mut [f32]) {
     let n = here.len();
     for ((out, h), b) in out.iter_mut().zip(here.windows(2)).zip(below.windows(2)) {

@@ -17,6 +17,7 @@
 //!   `v`: the plate then bends at a cost of `1 / (1 + 12 v)` and is tied to the data by the rest, as a
 //!   rounding error of variance 1/12 asks for.
 
+use heightfield::lanes::{self, Kernel, Lanes};
 use rayon::prelude::*;
 
 use super::grid::{Grid, mixed, second, second_across};
@@ -207,7 +208,8 @@ impl Plate<'_> {
             surface.par_chunks_mut(block).zip(to.par_chunks_mut(block)).enumerate().for_each_init(
                 || Scratch::new(width),
                 |scratch, (task, (surface, to))| {
-                    self.relax_rows(stiffness, &from, task * TASK_ROWS, surface, to, momentum, scratch);
+                    let (plate, from, first) = (self, from.as_slice(), task * TASK_ROWS);
+                    lanes::dispatch(Rows { plate, stiffness, from, first, surface, to, momentum, scratch });
                 },
             );
             std::mem::swap(&mut from, &mut to);
@@ -215,32 +217,40 @@ impl Plate<'_> {
         }
         Ok(())
     }
+}
 
-    #[expect(clippy::too_many_arguments, reason = "the arrays of one step")]
-    fn relax_rows(
-        &self,
-        stiffness: &Stiffness,
-        from: &[f32],
-        first: usize,
-        surface: &mut [f32],
-        to: &mut [f32],
-        momentum: f32,
-        scratch: &mut Scratch,
-    ) {
-        let grid = self.grid;
+/// Rows of one step; of the lanes they run with they only take the instruction set.
+struct Rows<'a, 'p> {
+    plate: &'a Plate<'p>,
+    stiffness: &'a Stiffness,
+    from: &'a [f32],
+    first: usize,
+    surface: &'a mut [f32],
+    to: &'a mut [f32],
+    momentum: f32,
+    scratch: &'a mut Scratch,
+}
+
+impl Kernel for Rows<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Self { plate, stiffness, from, first, surface, to, momentum, scratch } = self;
+        let Plate { grid, range: [low, high], half, quantised, .. } = *plate;
         let width = grid.size[0];
-        let [low, high] = self.range;
         scratch.begin(grid, stiffness, from, first);
         for (k, (surface, to)) in surface.chunks_mut(width).zip(to.chunks_mut(width)).enumerate() {
             let j = first + k;
             scratch.gradient(grid, stiffness, from, j);
             let at = j * width..(j + 1) * width;
-            let (start, q, tie) = (&from[at.clone()], &self.quantised[at.clone()], &stiffness.tie[at]);
-            let force = &scratch.force[..width];
+            let (start, q, tie) = (&from[at.clone()], &quantised[at.clone()], &stiffness.tie[at]);
+            // Of one length, so that no index is checked.
+            let (surface, to, force) = (&mut surface[..width], &mut to[..width], &scratch.force[..width]);
             for i in 0..width {
                 let pull = force[i] + tie[i] * (start[i] - q[i]);
                 let moved = start[i] - pull * (1.0 / STIFFEST);
-                let inside = moved.max(q[i] - self.half).min(q[i] + self.half).max(low).min(high);
+                let inside = moved.max(q[i] - half).min(q[i] + half).max(low).min(high);
                 to[i] = inside + momentum * (inside - surface[i]);
                 surface[i] = inside;
             }
@@ -253,6 +263,7 @@ fn byte(weight: f32) -> u8 {
 }
 
 /// Multiplies differences by weights.
+#[inline(always)]
 fn weigh(differences: &mut [f32], weights: &[u8]) {
     for (difference, &weight) in differences.iter_mut().zip(weights) {
         *difference *= f32::from(weight) * (1.0 / 255.0);
@@ -276,6 +287,7 @@ impl Scratch {
     }
 
     /// Fills in what the row before `first` would have left.
+    #[inline(always)]
     fn begin(&mut self, grid: Grid, stiffness: &Stiffness, from: &[f32], first: usize) {
         let above = grid.around(first).0;
         down(grid, stiffness, from, above, &mut self.down[1]);
@@ -284,6 +296,7 @@ impl Scratch {
     }
 
     /// The gradient of the plate's energy in row `j`, called row after row.
+    #[inline(always)]
     fn gradient(&mut self, grid: Grid, stiffness: &Stiffness, from: &[f32], j: usize) {
         let width = grid.size[0];
         self.down.rotate_left(1);
@@ -298,21 +311,23 @@ impl Scratch {
             *force += (a - h) + (b - h);
         }
         let [above, here] = &self.twist;
-        let difference = |i: usize| above[i] - here[i];
+        let (above, here, force) = (&above[..width], &here[..width], &mut self.force[..width]);
         let last = width - 1;
-        self.force[0] += 2.0 * (difference(last) - difference(0));
+        force[0] += 2.0 * ((above[last] - here[last]) - (above[0] - here[0]));
         for i in 1..width {
-            self.force[i] += 2.0 * (difference(i - 1) - difference(i));
+            force[i] += 2.0 * ((above[i - 1] - here[i - 1]) - (above[i] - here[i]));
         }
     }
 }
 
+#[inline(always)]
 fn down(grid: Grid, stiffness: &Stiffness, from: &[f32], j: usize, out: &mut [f32]) {
     let (above, below) = grid.around(j);
     second_across(grid.row(from, above), grid.row(from, j), grid.row(from, below), out);
     weigh(out, &stiffness.along[1][j * grid.size[0]..][..grid.size[0]]);
 }
 
+#[inline(always)]
 fn twist(grid: Grid, stiffness: &Stiffness, from: &[f32], j: usize, out: &mut [f32]) {
     mixed(grid.row(from, j), grid.row(from, grid.around(j).1), out);
     weigh(out, &stiffness.along[2][j * grid.size[0]..][..grid.size[0]]);
