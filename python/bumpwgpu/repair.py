@@ -330,6 +330,8 @@ def dequantise(
 def tile_report(source: HeightMap | HeightSource, **options: Any) -> TileReport:
     """Whether a height map tiles: steps and bends across its edge against those inside.
 
+    The check before and after a map is detiled, also as ``bumpwgpu lint``.
+
     Parameters
     ----------
     source : HeightMap, path, array or PIL image

@@ -10,6 +10,11 @@
 //! Nelson Max, Horizon Mapping: Shadows for Bump-Mapped Surfaces, The Visual Computer 4(2), 1988. How
 //! it is computed: [`sweep`](crate::sweep).
 //!
+//! Values are exact along the axes and the diagonals of square texels. In between, what stands `d` texels away is
+//! seen up to a texel beside where it is, so beside the ends of upright walls a value may be that of an azimuth
+//! `1 / d` radians away, or between both; which, depends on where the map begins: docs/performance.md has
+//! figures.
+//!
 //! The relief is looked at for at least one length of the map along the azimuth's main axis, past the
 //! border as the wrap mode says. What lies farther cannot rise above `scale / tile` of that length.
 
