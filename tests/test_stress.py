@@ -60,8 +60,9 @@ def test_other_searches_pass_too(technique: str) -> None:
 # Planted faults
 
 
-def shifted(hits: Any, t: Any) -> SimpleNamespace:
-    return SimpleNamespace(t=t, z=hits.z, status=hits.status)
+def shifted(hits: Any, t: Any = None, **others: Any) -> SimpleNamespace:
+    kept = {name: getattr(hits, name) for name in ("t", "uv", "z", "normal", "status")}
+    return SimpleNamespace(**{**kept, "t": hits.t if t is None else t, **others})
 
 
 def test_an_epsilon_nudge_is_found() -> None:
@@ -116,6 +117,113 @@ def test_answers_that_are_none_are_found() -> None:
     broken = march_only(raising)
     assert checks(broken) >= {"runs"}
     assert "gave up" in str(broken)
+
+
+def test_small_faults_of_hits_are_found() -> None:
+    def late(*rays: Any, **options: Any) -> Any:
+        hits = bw.march(*rays, **options)
+        return shifted(hits, hits.t * 1.0001)
+
+    assert {"on the surface", "on the ray", "uv on the ray"} <= checks(march_only(late))
+    assert {"on the ray", "uv on the ray"} <= checks(march_only(late, "relief"))
+
+    def later(height_map: Any, origins: Any, directions: Any, technique: Any, **options: Any) -> Any:
+        # Everything moved along: only the surface knows.
+        hits = bw.march(height_map, origins, directions, technique, **options)
+        t = hits.t + np.float32(1e-4)
+        return shifted(
+            hits,
+            t,
+            uv=origins[:, :2] + t[:, None] * directions[:, :2],
+            z=origins[:, 2] + t * directions[:, 2],
+        )
+
+    assert "on the surface" in checks(march_only(later))
+
+    def flipped(*rays: Any, **options: Any) -> Any:
+        hits = bw.march(*rays, **options)
+        return shifted(hits, uv=hits.uv * np.float32([1, -1]) + np.float32([0, 1]))
+
+    assert "uv on the ray" in checks(march_only(flipped))
+
+
+def test_small_faults_of_hit_normals_are_found() -> None:
+    def steeper(*rays: Any, **options: Any) -> Any:
+        hits = bw.march(*rays, **options)
+        bent = hits.normal * np.float32([1.01, 1.01, 1.0])
+        return shifted(hits, normal=bent / np.linalg.norm(bent, axis=1, keepdims=True))
+
+    assert checks(march_only(steeper)) == {"normal"}
+
+    def turned(*rays: Any, **options: Any) -> Any:
+        hits = bw.march(*rays, **options)
+        return shifted(hits, normal=hits.normal * np.float32([1, -1, 1]))
+
+    assert checks(march_only(turned)) == {"normal"}
+
+    def unwrapped(height_map: Any, *rays: Any, **options: Any) -> Any:
+        # Right but in the cells across the border, whose slope is that of a map that ends there.
+        hits = bw.march(height_map, *rays, **options)
+        size = np.array(height_map.shape[::-1])
+        ends = bw.HeightMap(height_map.array, scale=height_map.scale, wrap="clamp")
+        at = hits.uv - np.floor(hits.uv)
+        edge = ((at * size < 0.5) | (at * size > size - 0.5)).any(axis=1)
+        origins = np.concatenate([at, np.full((len(at), 1), 1.0, np.float32)], axis=1).astype(np.float32)
+        down = np.tile(np.float32([0, 0, -1]), (len(at), 1))
+        wrong = bw.march(ends, np.nan_to_num(origins, nan=0.5), down, "exact").normal
+        return shifted(hits, normal=np.where(edge[:, None], wrong, hits.normal))
+
+    found = bw.stress("exact", maps=[], frames=[], march=unwrapped, rays=64, only="repeat")
+    assert checks(found) == {"normal"}
+
+
+def test_rays_that_disturb_their_neighbours_are_found() -> None:
+    def leaking(*rays: Any, **options: Any) -> Any:
+        # A lane that is done, here every fifth, spoils the next one a little.
+        hits = bw.march(*rays, **options)
+        t = hits.t.copy()
+        t[1::5] = np.nextafter(t[1::5], np.float32(0))
+        return shifted(hits, t)
+
+    assert checks(march_only(leaking)) == {"in reverse"}
+
+    def spreading(*rays: Any, **options: Any) -> Any:
+        hits = bw.march(*rays, **options)
+        t = hits.t.copy()
+        t[1:][~np.isfinite(hits.t[:-1])] = np.nan
+        t[5] = np.nan
+        return shifted(hits, t)
+
+    assert "answers" in checks(march_only(spreading))
+
+
+def test_small_faults_of_bakes_are_found() -> None:
+    def wider(*arguments: Any, **options: Any) -> Any:
+        return {"cone": bw.bake(*arguments, **options)["cone"] * 1.01}
+
+    assert "conservative" in checks(bw.stress([], maps=["cone"], frames=[], bake=wider))
+
+    def reversed_(*arguments: Any, **options: Any) -> Any:
+        made = bw.bake(*arguments, **options)["horizon"]
+        return {"horizon": np.roll(made[::-1], 1, axis=0)}
+
+    assert "order of azimuths" in checks(bake_only("horizon", reversed_))
+    assert bake_only("horizon")
+
+    for factor in (0.98, 1.02):
+
+        def dimmed(*arguments: Any, factor: float = factor, **options: Any) -> Any:
+            return {"ao": bw.bake(*arguments, **options)["ao"] * factor}
+
+        found = checks(bw.stress([], maps=["ao"], frames=[], bake=dimmed, only="flat"))
+        assert found >= {"flat ground"}
+
+    def steeper(source: Any, *arguments: Any, **options: Any) -> Any:
+        other = bw.HeightMap(source.array, scale=1.01 * source.scale, wrap=source.wrap)
+        return bw.bake(other, *arguments, **options)
+
+    for name in ("normal", "relief", "normal_xy"):
+        assert any(check.startswith("formula") for check in checks(bake_only(name, steeper))), name
 
 
 def test_a_swapped_green_is_found() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from ._map_info import MAPS
 from ._stress_cases import WRAPS
 from ._stress_rows import Check, failed, row
+from ._stress_surface import folded, padded, surface
 from .errors import BumpWarning
 from .heightmap import HeightMap
 
@@ -77,6 +79,8 @@ def _of_one(bake: Bake, name: str, source: HeightMap, made: list[NDArray[np.floa
         yield from _pyramid(source, made)
     if name == "distance":
         yield _distances(source, made[0])
+    if name == "horizon" and source.scale == 0.1:
+        yield from _horizons(source, made[0])
     if name in ("horizon", "ao") and np.ptp(source.array) == 0.0:
         flat = 1.0 if name == "ao" else 0.0
         yield _check("flat ground", [np.abs(layer - flat) for layer in made], "value", 1e-6)
@@ -127,7 +131,7 @@ def _normals(bake: Bake, name: str, source: HeightMap) -> Iterator[Check]:
 
 
 def _true_normals(source: HeightMap, smoothing: tuple[int, int, int], total: float) -> Heights:
-    heights = _padded(source)
+    heights = padded(source)
     rows, columns = source.shape
     near = {
         (i, j): heights[1 + j : 1 + j + rows, 1 + i : 1 + i + columns] for i in (-1, 0, 1) for j in (-1, 0, 1)
@@ -141,36 +145,6 @@ def _true_normals(source: HeightMap, smoothing: tuple[int, int, int], total: flo
     normals = np.stack(np.broadcast_arrays(x, y, 1.0), axis=-1)
     unit: Heights = normals / np.linalg.norm(normals, axis=-1, keepdims=True)
     return unit
-
-
-def _padded(source: HeightMap, by: int = 1) -> Heights:
-    """The heights with what lies beyond the edge, in double precision."""
-    rows, columns = (_folded(np.arange(-by, side + by), side, source.wrap) for side in source.shape)
-    return source.array.astype(np.float64)[np.ix_(rows, columns)]
-
-
-def _folded(index: NDArray[np.int64], side: int, wrap: str) -> NDArray[np.int64]:
-    if wrap == "repeat":
-        return index % side
-    if wrap == "clamp":
-        return np.clip(index, 0, side - 1)
-    turned = index % (2 * side)
-    return np.where(turned < side, turned, 2 * side - 1 - turned)
-
-
-def _surface(source: HeightMap, u: Heights, v: Heights) -> Heights:
-    """The bilinear surface in double precision."""
-    rows, columns = source.shape
-    x, y = u * columns - 0.5, v * rows - 0.5
-    i, j = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
-    f, g = x - i, y - j
-    heights = source.array.astype(np.float64)
-    left, right = (_folded(i + step, columns, source.wrap) for step in (0, 1))
-    above, below = (_folded(j + step, rows, source.wrap) for step in (0, 1))
-    upper = heights[above, left] * (1 - f) + heights[above, right] * f
-    lower = heights[below, left] * (1 - f) + heights[below, right] * f
-    surface: Heights = upper * (1 - g) + lower * g
-    return surface
 
 
 def cones(name: str, source: HeightMap, ratios: NDArray[np.float64]) -> Check:
@@ -192,9 +166,9 @@ def cones(name: str, source: HeightMap, ratios: NDArray[np.float64]) -> Check:
     for _ in range(2):
         u = (column + 0.5 + rng.uniform(-1.0, 1.0, len(column))) / columns
         v = (row + 0.5 + rng.uniform(-1.0, 1.0, len(row))) / rows
-        low = _surface(source, u, v)
+        low = surface(source, u, v)
         for angle in turn:
-            along = _surface(
+            along = surface(
                 source,
                 u[:, None] + np.cos(angle) * reach,
                 v[:, None] + np.sin(angle) * reach,
@@ -204,7 +178,69 @@ def cones(name: str, source: HeightMap, ratios: NDArray[np.float64]) -> Check:
                 falls = np.diff(along, axis=1, append=along[:, -1:]) < 0.0
                 inside = np.where(falls, inside, 0.0)
             worst[row, column] = np.maximum(worst[row, column], inside.max(axis=1))
+    if name == "cone":
+        worst[row, column] = np.maximum(worst[row, column], _touching(source, ratio[:, 0], row, column))
     return _check("conservative", [worst], "heights", 1e-6)
+
+
+def _touching(
+    source: HeightMap, ratio: Heights, row: NDArray[np.int64], column: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """How far texels reach into cones that stand on the texel and on its eight neighbours.
+
+    Peaks are where cones touch, so a cone that is too wide by a little shows here first.
+    """
+    rows, columns = source.shape
+    near = np.arange(-12, 13)
+    dy, dx = (part.ravel() for part in np.meshgrid(near, near, indexing="ij"))
+    apart = np.hypot(dx / columns, dy / rows)
+    worst = np.full(len(row), -np.inf)
+    heights = source.array.astype(np.float64)
+
+    def height(y: NDArray[np.int64], x: NDArray[np.int64]) -> Heights:
+        return heights[folded(y, rows, source.wrap), folded(x, columns, source.wrap)]
+
+    for down, right in itertools.product((-1, 0, 1), repeat=2):
+        y, x = row + down, column + right
+        target = height(y[:, None] + dy, x[:, None] + dx)
+        inside = target - height(y, x)[:, None] - apart / ratio[:, None]
+        worst = np.maximum(worst, inside.max(axis=1))
+    return worst
+
+
+def _horizons(source: HeightMap, made: NDArray[np.float64]) -> Iterator[Check]:
+    """Mean difference of some horizons to those found by looking along rays sixteen times a texel.
+
+    Sweeps look along lines up to half a texel beside a texel's centre: as much as that changes horizons they
+    may differ, in the mean over texels and azimuths; and no other order of azimuths may fit twice as well.
+    """
+    rng = np.random.default_rng(7)
+    rows, columns = source.shape
+    texels = rng.permutation(rows * columns)[:48]
+    row, column = np.unravel_index(texels, (rows, columns))
+    wide, tall = source.tile_size
+    low = source.array.astype(np.float64)[row, column]
+    share = (np.arange(16 * max(rows, columns)) + 1) / (16 * max(rows, columns))
+    texel = min(wide / columns, tall / rows)
+    truths, allowed = [], []
+    for azimuth in range(len(made)):
+        turn = 2.0 * np.pi * azimuth / len(made)
+        x, y = np.cos(turn), np.sin(turn)
+        along = share * min(wide / max(abs(x), 1e-9), tall / max(abs(y), 1e-9))
+        found = []
+        for aside in (-0.5 * texel, 0.0, 0.5 * texel):
+            u = (column[:, None] + 0.5) / columns + (along * x - aside * y) / wide
+            v = (row[:, None] + 0.5) / rows - (along * y + aside * x) / tall
+            rise = source.scale * (surface(source, u, v) - low[:, None])
+            found.append(np.maximum((rise / np.hypot(rise, along)).max(axis=1), 0.0))
+        truths.append(found[1])
+        allowed.append(np.max(found, axis=0) - np.min(found, axis=0))
+    ours, truth = made[:, row, column], np.array(truths)
+    off = np.abs(ours - truth).mean()
+    yield _check("horizons", [off[None]], "mean value", float(np.mean(allowed)) + 1e-6)
+    orders = [np.roll(way, turn, axis=0) for way in (truth, truth[::-1]) for turn in range(len(made))]
+    best = min(np.abs(ours - order).mean() for order in orders)
+    yield _check("order of azimuths", [np.array([off / (best + 1e-6)])], "ratio", 2.0)
 
 
 def _pyramid(source: HeightMap, made: list[NDArray[np.float64]]) -> Iterator[Check]:
@@ -215,7 +251,7 @@ def _pyramid(source: HeightMap, made: list[NDArray[np.float64]]) -> Iterator[Che
     yield _check("top level", [np.array(off)], "heights", 0.0)
     # Each cell's four corners lie between its two numbers.
     rows, columns = made[0].shape[:2]
-    wrapped = _padded(source)
+    wrapped = padded(source)
     corners = [wrapped[1 + j : 1 + j + rows, 1 + i : 1 + i + columns] for j in (0, 1) for i in (0, 1)]
     if all(part.shape == (rows, columns) for part in corners):
         above = [part - made[0][..., 1] for part in corners]
@@ -236,10 +272,10 @@ def _distances(source: HeightMap, made: NDArray[np.float64]) -> Check:
     for _ in range(160):
         size = 10.0 ** rng.uniform(-3.0, 0.0, count)
         a, b = u + rng.normal(size=count) * size, v + rng.normal(size=count) * size
-        rise = source.scale * (_surface(source, a, b) - z)
+        rise = source.scale * (surface(source, a, b) - z)
         near = np.minimum(near, np.sqrt(((a - u) * wide) ** 2 + ((b - v) * tall) ** 2 + rise**2))
     # Points below the surface are none that a search stands on.
-    over = z > _surface(source, u, v)
+    over = z > surface(source, u, v)
     longer = np.where(over, made[k, j, i] - near, 0.0)
     return _check("lower bound", [longer], "mesh units", 1e-6)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from . import _bumpwgpu
 from ._stress_cases import RayCase
 from ._stress_rows import Check, failed, row
+from ._stress_surface import gradients
 from .errors import BumpWarning
 from .heightmap import HeightMap
 from .techniques import Technique
@@ -32,6 +34,15 @@ MOST_TEXELS = {"cpu": 1 << 20, "gpu": 1 << 15}
 #: Share of rays that a symmetry may change: those that rounding moves across an edge.
 MOST_CHANGED = 0.02
 
+#: Roundings to 32 bits between t and uv: of t, the direction, the product, the origin and the sum, each seen
+#: against the sum of their magnitudes; and one for the way back.
+MOST_ULPS_UV = 6.0
+#: Texels that rounding may move uv by before its normal is no longer looked at.
+MOST_BLUR = 0.05
+#: Degrees that a normal may be off besides: its three numbers have 24 bits, as have the differences of
+#: heights it is made of.
+MOST_DEGREES = 1e-3
+
 March = Callable[..., Any]
 
 
@@ -39,6 +50,7 @@ def march_checks(march: March, technique: Technique, case: RayCase, device: str)
     """Runs one search on one case; yields what was found."""
     try:
         hits = _run(march, technique, case.height_map, case.origins, case.directions, case.dtype, device)
+        uv, normal = (np.asarray(getattr(hits, name), np.float64) for name in ("uv", "normal"))
     except Exception as error:  # a fault in what is tested must become a line in the table
         yield failed("runs", f"{type(error).__name__}: {error}")
         return
@@ -51,6 +63,8 @@ def march_checks(march: March, technique: Technique, case: RayCase, device: str)
     along = case.origins[:, 2] + np.where(found, t, 0.0) * case.directions[:, 2]
     scale = np.abs(case.origins[:, 2]) + np.abs(np.where(found, t, 0.0) * case.directions[:, 2]) + 1.0
     yield _worst(case, "on the ray", np.where(found, np.abs(z - along) / (scale * EPSILON), 0.0), "ulps", 8.0)
+    yield _places(case, np.where(found, t, 0.0), np.where(found[:, None], uv, case.origins[:, :2]))
+    yield _normals(case, np.where(found[:, None], uv, 0.0), np.where(found[:, None], normal, np.nan))
     if guaranteed:
         yield from _judged(case, t, status)
     elif case.name.startswith("flat 0.5"):
@@ -77,8 +91,37 @@ def _run(
             directions.astype(dtype),
             technique,
             device=device,
-            outputs=("t", "z", "status"),
+            outputs=("t", "uv", "z", "normal", "status"),
         )
+
+
+def _places(case: RayCase, t: NDArray[np.float64], uv: NDArray[np.float64]) -> Check:
+    """Whether uv is the point of the ray at t, in roundings to 32 bits of what was added up."""
+    run = t[:, None] * case.directions[:, :2]
+    unit = EPSILON * (np.abs(case.origins[:, :2]) + np.abs(run) + np.abs(uv))
+    off = np.abs(uv - (case.origins[:, :2] + run)) / np.maximum(unit, 1e-300)
+    return _worst(case, "uv on the ray", off.max(axis=1), "ulps", MOST_ULPS_UV)
+
+
+def _normals(case: RayCase, uv: NDArray[np.float64], normal: NDArray[np.float64]) -> Check:
+    """Degrees between a normal and that of the bilinear surface at uv, or of a cell that rounding reaches."""
+    rows, columns = case.height_map.shape
+    size = np.array([columns, rows])
+    at = uv * size - 0.5
+    reach = 8.0 * EPSILON * (np.abs(uv) + np.abs(case.origins[:, :2]) + 1.0) * size
+    best = np.full(len(uv), np.inf)
+    for step in itertools.product((-1.0, 0.0, 1.0), repeat=2):
+        x, y = (at + step * reach).T
+        gradient = np.stack(gradients(case.height_map, x, y), axis=-1) * size
+        truth = np.concatenate([-gradient, np.ones((len(uv), 1))], axis=-1)
+        truth /= np.linalg.norm(truth, axis=-1, keepdims=True)
+        chord = np.linalg.norm(normal - truth, axis=-1)
+        best = np.fmin(best, np.degrees(2.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0))))
+    # Where a texel is not much more than what rounding reaches, uv says nothing about the cell.
+    known = (reach.max(axis=1) < MOST_BLUR) & ~np.isnan(normal).all(axis=1)
+    # Within a cell the slope changes by no more than the relief over the reach, on either axis.
+    blur = np.degrees(2.0 * reach.max(axis=1) * size.max())
+    return _worst(case, "normal", np.where(known, np.maximum(best - blur, 0.0), 0.0), "degrees", MOST_DEGREES)
 
 
 def _answers(case: RayCase, t: NDArray[Any], status: NDArray[Any], most_texels: int) -> Check:
@@ -151,6 +194,9 @@ def _symmetries(
         flip = np.array([-1.0, 1.0, 1.0])
         origins = case.origins * flip + np.array([1.0, 0.0, 0.0])
         yield _same(march, technique, case, t, device, "mirrored", turned, origins, case.directions * flip)
+    if case.group in ("grazing", "map"):
+        # Who else is asked about must not matter: rays share lanes, bounds and blocks.
+        yield _same(march, technique, case, t, device, "in reverse", heights, None, None, reverse=True)
     if case.group == "length":
         yield _same(
             march, technique, case, t * 8.0, device, "longer rays", heights, None, case.directions / 8.0
@@ -169,15 +215,20 @@ def _same(
     height_map: HeightMap,
     origins: NDArray[np.float64] | None,
     directions: NDArray[np.float64] | None,
+    reverse: bool = False,
 ) -> Check:
     """Share of rays for which an equal question has another answer, by a hundredth of a texel."""
     start = case.origins if origins is None else origins
     along = case.directions if directions is None else directions
+    order = slice(None, None, -1 if reverse else 1)
+    # The same numbers again have to get the same answer, others may be rounded otherwise.
+    dtype = case.dtype if reverse else np.float64
+    most = 0.0 if reverse else MOST_CHANGED
     try:
-        other = _run(march, technique, height_map, start, along, np.float64, device)
+        other = _run(march, technique, height_map, start[order], along[order], dtype, device)
     except Exception as error:  # as above
         return failed(name, f"{type(error).__name__}: {error}")
-    again = np.asarray(other.t, np.float64)
+    again = np.asarray(other.t, np.float64)[order]
     rows, columns = case.height_map.shape
     run = np.hypot(along[:, 0] * columns, along[:, 1] * rows) + np.abs(along[:, 2])
     both = np.isfinite(t) & np.isfinite(again)
@@ -185,9 +236,9 @@ def _same(
         change = np.where(both, np.abs(t - again) * run, (np.isfinite(t) != np.isfinite(again)) * 1e9)
     # Grazing rays cross many texels in one step of 32-bit rounding.
     allowed = 0.01 + 64.0 * EPSILON * np.where(both, np.abs(t) * run, 0.0)
-    changed = change > allowed
-    check = _worst(case, name, np.where(changed, change, 0.0), "share of rays", MOST_CHANGED)
-    return {**check, "worst": float(changed.mean()), "passed": bool(changed.mean() <= MOST_CHANGED)}
+    changed = change > (0.0 if reverse else allowed)
+    check = _worst(case, name, np.where(changed, change, 0.0), "share of rays", most)
+    return {**check, "worst": float(changed.mean()), "passed": bool(changed.mean() <= most)}
 
 
 def _worst(case: RayCase, name: str, values: NDArray[np.float64], unit: str, limit: float) -> Check:
