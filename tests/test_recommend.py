@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import csv
+import re
+import shutil
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -230,6 +233,34 @@ def test_the_shader_is_of_exactly_that_variant(result: bw.CompareResult, languag
         advice.shader("cg")  # type: ignore[arg-type]
 
 
+def test_other_compilers_take_the_shaders(tmp_path: Path) -> None:
+    compiler = shutil.which("glslangValidator")
+    if compiler is None:
+        pytest.skip("no glslangValidator (Debian: glslang-tools)")
+
+    def compiles(text: str, suffix: str, *options: str) -> str:
+        path = tmp_path / f"search.{suffix}"
+        path.write_text(text)
+        command = [compiler, *options, str(path)]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=tmp_path)
+        return "" if done.returncode == 0 else done.stdout
+
+    for name in bw.techniques.marching():
+        for wrap in ("repeat", "clamp", "mirror"):
+            parameters = bw.techniques.get(name).parameters
+            here = bw.HeightMap([[0.5]], wrap=wrap)
+            made = bw.Recommendation(name, parameters, None, None, None, "", _height_map=here)
+            glsl, hlsl = made.shader("glsl"), made.shader("hlsl")
+            assert not compiles(glsl, "frag"), f"{name}, {wrap}, GLSL"
+            entry = re.search(r"(\w+)\([^)]*\)\s*:\s*SV_Target", hlsl)
+            assert entry
+            options = ("-D", "-V", "-S", "frag", "-e", entry[1], "-o", "search.spv")
+            assert not compiles(hlsl, "hlsl", *options), f"{name}, {wrap}, HLSL"
+    broken = glsl.replace("search(", "serach(", 1)
+    assert "serach" in broken
+    assert compiles(broken, "frag"), "the compiler notices what is wrong"
+
+
 def test_every_technique_that_searches_can_be_written_out() -> None:
     for name in bw.techniques.marching():
         parameters = bw.techniques.get(name).parameters
@@ -242,3 +273,51 @@ def test_every_technique_that_searches_can_be_written_out() -> None:
     assert "const endless: bool = true;" in made.shader()
     with pytest.raises(ValueError, match="does not search"):
         bw.Recommendation("flat", {}, None, None, None, "").shader()
+
+
+# Unseen rays
+
+
+@pytest.mark.slow
+def test_bounds_hold_on_unseen_rays() -> None:
+    """Nineteen of twenty recommendations keep their bound on other seeds and at angles between."""
+    cases, kept, broken = 0, 0, []
+    kinds = ("sines", "fbm", "bricks", "spheres", "ridge", "wall", "sinc", "dot")
+    for at, kind in enumerate((*kinds, "sines", "fbm")):
+        height_map = bw.HeightMap.procedural(kind, size=96 + 16 * at, seed=500 + at, scale=0.02 + 0.01 * at)
+        result = bw.compare(height_map, device="cpu", rays=2048, repeats=2, seed=at)
+        for budget in (0.01, 0.1, 0.5, 2.0, 8.0):
+            for allowed in (1e-3, 0.05):
+                advice = result.recommend(budget, max_failure_rate=allowed)
+                if not advice:
+                    continue
+                unseen = bw.compare(
+                    height_map,
+                    advice.object(),
+                    formats=None if advice.cones_format else [advice.heights_format],
+                    elevations=(81, 64, 33, 27, 14, 7.5),
+                    device="cpu",
+                    rays=4096,
+                    repeats=1,
+                    seed=7000 + at,
+                ).select()[0]
+                assert advice.bound_p99_texels is not None
+                assert advice.bound_p99_texels <= budget
+                cases += 1
+                held = unseen["uv_error_p99_texels"] <= max(advice.bound_p99_texels, 1e-3)
+                held &= unseen["failure_rate"] <= max(advice.bound_failure_rate or 0.0, allowed)
+                kept += held
+                if not held:
+                    broken.append(
+                        (
+                            kind,
+                            budget,
+                            advice.technique,
+                            advice.bound_p99_texels,
+                            unseen["label"],
+                            unseen["uv_error_p99_texels"],
+                            unseen["failure_rate"],
+                        )
+                    )
+    assert cases >= 60
+    assert kept >= 0.95 * cases, f"{kept} of {cases}: {broken}"

@@ -26,7 +26,8 @@ Heights = NDArray[np.float64]
 _SHIFTING = ("normal", "normal_xy", "relief", "cone", "curvature", "horizon", "ao", "bent_normal")
 #: Their first channel points along x, so that mirroring the map turns its sign.
 _SIGNED = ("normal", "normal_xy", "relief", "bent_normal")
-#: Mean change of horizons and occlusion when the map is shifted or mirrored.
+#: Mean change of horizons and occlusion when the map is shifted or mirrored: what is left of lines that pass
+#: up to half a texel beside a centre when they are spread evenly. Measured at most 0.0034, on a checkerboard.
 MOST_MEAN = 4e-3
 #: Scales of the relief a map is baked at, mesh units.
 _SCALES = (1e-6, 0.1, 1e6)
@@ -303,9 +304,9 @@ def _compared(name: str, check: str, again: NDArray[np.float64], made: NDArray[n
         row = _check(check, [difference], "mean value", MOST_MEAN)
         mean = float(difference.mean())
         return {**row, "worst": mean, "passed": mean <= MOST_MEAN}
-    if name in ("cone", "relaxed_cone"):
-        # Lower bounds over blocks of cells: how much they give away depends on where blocks lie.
-        return _check(check, [difference], "ratio", 2e-3)
+    if name == "cone":
+        # The widest cone is one number whichever way it was found: four roundings of ratios up to 1.
+        return _check(check, [difference], "ratio", 4.0 * _EPSILON)
     largest = float(np.abs(made[np.isfinite(made)]).max(initial=0.0))
     return _check(check, [difference], "value", 4e-6 * max(1.0, largest))
 
