@@ -311,3 +311,35 @@ for technique in ("normal", "relief", "exact", "cone", "dot3"):
     assert len(times) == 5
     for technique, first, later in times:
         assert float(later) < max(float(first) / 4, 5.0), (technique, first, later)
+
+
+@pytest.mark.gpu
+@pytest.mark.parametrize("technique", ["flat", "relief", "exact"])
+def test_what_stands_behind_a_wall_is_not_drawn(technique: str) -> None:
+    ball, wall = bw.Mesh.sphere(0.4), bw.Mesh.quad(2.0)
+    heights = bw.HeightMap.procedural("fbm", 64, scale=0.05)
+    rough = bw.Material(height=heights, specular=0.0)
+    raised = bw.Material(height=bw.HeightMap.procedural("fbm", 64, scale=0.05, base=0.0), specular=0.0)
+    front = bw.Camera.look_at((0.2, 0.3, 3), (0, 0, 0))
+    hidden, beside = place(shift=(0, 0, -1.5)), place(shift=(1.3, 0, -1.5))
+    wall_there = bw.Instance(wall, rough)
+    for scene, all_hidden in [
+        ([wall_there, bw.Instance(ball, rough, hidden)], True),
+        ([bw.Instance(ball, rough, hidden), wall_there], True),
+        ([wall_there, bw.Instance(ball, rough, beside)], False),
+        # Before the wall, and with a wall that faces away.
+        ([wall_there, bw.Instance(ball, rough, place(shift=(0, 0, 1)))], False),
+        ([bw.Instance(wall, rough, place(np.diag([-1.0, 1, 1]))), bw.Instance(ball, rough, hidden)], True),
+        (
+            [bw.Instance(wall, rough, place(rotation((0, 1, 0), 180))), bw.Instance(ball, rough, hidden)],
+            False,
+        ),
+        # Raised relief may come out in front of the mesh that it is on.
+        ([wall_there, bw.Instance(ball, raised, hidden)], technique == "flat"),
+    ]:
+        frame = draw(scene, camera=front, technique=technique, skip="occlusion", aovs=("depth", "uv"))
+        plain = draw(scene, camera=front, technique=technique, skip=False, aovs=("depth", "uv"))
+        np.testing.assert_array_equal(frame.color, plain.color)
+        np.testing.assert_array_equal(frame.aovs["depth"], plain.aovs["depth"])
+        assert (frame.stats["skipped"]["occlusion"] >= len(ball.indices)) == all_hidden
+        assert plain.stats["skipped"]["occlusion"] == 0

@@ -9,10 +9,14 @@ use std::ops::Range;
 use glam::{DMat4, DVec3};
 
 use crate::clusters::Cluster;
+use crate::walls::{Screen, Wall};
 use crate::{Camera, Skipped, Skips};
 
 /// Grid that devices round places in the picture to, pixels: twice how far off a corner can be.
 const SNAP: f64 = 1.0 / 256.0;
+
+/// Walls that everything is tested against at most.
+const MOST_SCREENS: usize = 16;
 
 /// A view, and what may be left out of it.
 pub(crate) struct Culling {
@@ -28,6 +32,8 @@ pub(crate) struct Culling {
     near: f64,
     /// How far off a corner may be drawn, pixels.
     off: f64,
+    /// Walls that hide what is behind them.
+    screens: Vec<Screen>,
 }
 
 /// Merges runs that follow one another.
@@ -99,6 +105,7 @@ impl Culling {
             focal: height / (2.0 * tangent),
             near: camera.near(),
             off: SNAP + width.max(height) * 1e-6,
+            screens: Vec::new(),
         }
     }
 
@@ -175,8 +182,32 @@ impl Culling {
         self.skips.contains(Skips::FRUSTUM) && self.is_outside(centre, radius)
     }
 
-    /// Runs of triangles that may be seen.
-    pub fn visible(&self, stand: &Stand, groups: &[Cluster], skipped: &mut Skipped) -> Vec<Range<u32>> {
+    /// Takes a wall of a draw into account. `middle`: of its mesh; `depth`: how deep its relief goes, mesh units.
+    pub fn add_wall(&mut self, wall: &Wall, stand: &Stand, middle: DVec3, depth: f64) {
+        if self.skips.contains(Skips::OCCLUSION) {
+            self.screens.extend(Screen::new(wall, stand, middle, depth, self.forward, self.near));
+        }
+    }
+
+    /// Keeps the walls that hide most.
+    pub fn settle_walls(&mut self) {
+        self.screens.sort_by(|a, b| b.size.total_cmp(&a.size));
+        self.screens.truncate(MOST_SCREENS);
+    }
+
+    /// Whether a ball relative to the camera is behind a wall.
+    pub fn is_hidden(&self, centre: DVec3, radius: f64) -> bool {
+        self.screens.iter().any(|screen| screen.hides(centre, radius, 1.0 / self.focal))
+    }
+
+    /// Runs of triangles that may be seen. `solid`: whether nothing shows before the triangles themselves.
+    pub fn visible(
+        &self,
+        stand: &Stand,
+        groups: &[Cluster],
+        solid: bool,
+        skipped: &mut Skipped,
+    ) -> Vec<Range<u32>> {
         let turns = self.skips.contains(Skips::BACKFACE) && !stand.double_sided;
         let mut runs = Vec::new();
         for group in groups {
@@ -186,6 +217,8 @@ impl Culling {
                 skipped.add(Skips::FRUSTUM, count);
             } else if turns && self.is_turned_away(stand, group) {
                 skipped.add(Skips::BACKFACE, count);
+            } else if solid && self.is_hidden(centre, group.radius * stand.stretch) {
+                skipped.add(Skips::OCCLUSION, count);
             } else {
                 add_run(&mut runs, group.first, group.end);
             }
@@ -257,7 +290,8 @@ mod tests {
                 let relative = DMat4::from_translation(-camera.eye) * place;
                 let culling = Culling::new(&camera, size, Skips::ALL);
                 let mut skipped = Skipped::default();
-                let runs = culling.visible(&Stand::new(relative, 1.0, false), &clusters.groups, &mut skipped);
+                let runs =
+                    culling.visible(&Stand::new(relative, 1.0, false), &clusters.groups, true, &mut skipped);
                 let shown: u64 = runs.iter().map(|run| u64::from(run.end - run.start)).sum();
                 let lost = [Skips::FRUSTUM, Skips::BACKFACE].map(|kind| skipped.of(kind));
                 assert_eq!(shown + lost[0] + lost[1], u64::from(count));
@@ -275,7 +309,8 @@ mod tests {
                 }
                 // All of it is there when nothing may be left out.
                 let all = Culling::new(&camera, size, Skips::NONE);
-                let whole = all.visible(&Stand::new(relative, 1.0, false), &clusters.groups, &mut skipped);
+                let whole =
+                    all.visible(&Stand::new(relative, 1.0, false), &clusters.groups, true, &mut skipped);
                 assert!(whole.len() == 1 && whole[0] == (0..count));
             }
         }
@@ -291,9 +326,9 @@ mod tests {
         let relative = DMat4::from_translation(-camera.eye);
         let culling = Culling::new(&camera, [200, 200], Skips::ALL);
         let mut skipped = Skipped::default();
-        culling.visible(&Stand::new(relative, 1.0, true), &clusters.groups, &mut skipped);
+        culling.visible(&Stand::new(relative, 1.0, true), &clusters.groups, true, &mut skipped);
         assert_eq!(skipped, Skipped::default());
-        culling.visible(&Stand::new(relative, 1.0, false), &clusters.groups, &mut skipped);
+        culling.visible(&Stand::new(relative, 1.0, false), &clusters.groups, true, &mut skipped);
         assert!(skipped.of(Skips::BACKFACE) > mesh.indices.len() as u64 / 5, "{skipped:?}");
     }
 }

@@ -5,6 +5,7 @@ use mesh::{Displaced, Mesh};
 use rayon::prelude::*;
 
 use crate::pipeline::ATTRIBUTES;
+use crate::walls::{Wall, walls};
 use crate::{Device, RenderError};
 
 /// Vertex buffers with their shader locations, in the order in which pipelines take them.
@@ -35,17 +36,19 @@ pub(crate) const CUBOID: [[u32; 3]; 12] = [
 ];
 
 /// Room that a mesh takes: its middle, to which positions are uploaded relative, and half its diagonal.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct Room {
     pub middle: DVec3,
     pub radius: f64,
+    /// Faces that may hide things.
+    pub walls: Vec<Wall>,
 }
 
 impl Room {
     pub fn of(mesh: &Mesh) -> Self {
         let (low, high) = bounds(&mesh.positions);
         let (low, high) = (low.as_dvec3(), high.as_dvec3());
-        Self { middle: (low + high) * 0.5, radius: (high - low).length() * 0.5 }
+        Self { middle: (low + high) * 0.5, radius: (high - low).length() * 0.5, walls: walls(mesh) }
     }
 }
 

@@ -42,6 +42,7 @@ pub mod uniforms;
 mod unpack;
 mod uploads;
 mod view;
+mod walls;
 mod warnings;
 
 pub use adapter::{ADAPTER_VARIABLE, AdapterInfo, adapters};

@@ -19,7 +19,7 @@ use crate::timer::Timer;
 use crate::uniforms::{DrawInfo, FrameInfo};
 use crate::unpack::Unpacker;
 use crate::view::{Call, ViewOf};
-use crate::{Camera, Device, Frame, Held, RenderError, Request, Scene, Stats, tally};
+use crate::{Camera, Device, Frame, Held, RenderError, Request, Scene, Skips, Stats, tally};
 
 /// Pixels drawn at once. Larger pictures are drawn in bands of rows, so that the memory that the
 /// targets take does not grow with the picture.
@@ -248,7 +248,7 @@ impl<'a> Renderer<'a> {
     /// How a draw stands in a view, unless it is outside.
     fn stands(&self, at: usize, camera: &Camera, culling: &Culling) -> Option<Stand> {
         let draw = &self.scene.draws[at];
-        let Room { middle, radius } = self.rooms.get(&address(&draw.mesh)).copied()?;
+        let &Room { middle, radius, .. } = self.rooms.get(&address(&draw.mesh))?;
         let relative =
             DMat4::from_translation(-camera.eye) * draw.world_from_object * DMat4::from_translation(middle);
         // What stays on the mesh covers the mesh, whatever depth it shows.
@@ -259,6 +259,28 @@ impl<'a> Renderer<'a> {
         seen.then_some(stand)
     }
 
+    /// Tells which walls of the scene hide what is behind them: those that are drawn as they are.
+    fn find_walls(&self, camera: &Camera, culling: &mut Culling) {
+        if self.request.in_shell() || self.request.technique.draws_geometry() {
+            return;
+        }
+        for (at, draw) in self.scene.draws.iter().enumerate() {
+            let Some(Room { middle, walls, .. }) = self.rooms.get(&address(&draw.mesh)) else { continue };
+            if walls.is_empty() {
+                continue;
+            }
+            let Some(stand) = self.stands(at, camera, culling) else { continue };
+            let extent = draw.material.field.extent();
+            let depth = if self.request.technique.displaces() { extent.scale * extent.base } else { 0.0 };
+            for wall in
+                walls.iter().filter(|wall| wall.faces.iter().all(|face| draw.triangles.contains(face)))
+            {
+                culling.add_wall(wall, &stand, *middle, f64::from(depth));
+            }
+        }
+        culling.settle_walls();
+    }
+
     /// What is drawn of a view, with its places and lights on the device.
     fn view(
         &mut self,
@@ -266,7 +288,8 @@ impl<'a> Renderer<'a> {
         stats: &mut Stats,
         warnings: &mut Vec<String>,
     ) -> Result<Vec<Call>, RenderError> {
-        let culling = self.culling(camera);
+        let mut culling = self.culling(camera);
+        self.find_walls(camera, &mut culling);
         let mut view = ViewOf::new(&self.device, camera, &self.request, &culling);
         let stride = self.shared.stride as usize;
         let mut places = Vec::new();
@@ -274,9 +297,15 @@ impl<'a> Renderer<'a> {
             let draw = &self.scene.draws[at];
             let Some(stand) = self.stands(at, camera, &culling) else {
                 let count = u64::from(draw.triangles.end - draw.triangles.start);
-                stats.skipped.add(crate::Skips::FRUSTUM, count);
+                stats.skipped.add(Skips::FRUSTUM, count);
                 continue;
             };
+            let ball = stand.relative_from_object.w_axis.truncate();
+            if self.request.is_solid(&draw.material) && culling.is_hidden(ball, stand.radius) {
+                let count = u64::from(draw.triangles.end - draw.triangles.start);
+                stats.skipped.add(Skips::OCCLUSION, count);
+                continue;
+            }
             let middle = self.rooms.get(&address(&draw.mesh)).map_or(glam::DVec3::ZERO, |room| room.middle);
             if self.draws[at].is_none() {
                 let (request, shadows) = (&self.request, self.shadows);
@@ -298,7 +327,7 @@ impl<'a> Renderer<'a> {
             self.device.queue.write_buffer(&self.frame.lights, 0, lights);
             Ok(())
         })?;
-        Ok(view.calls())
+        Ok(view.calls(stats))
     }
 
     /// Submits the band that begins at a row.

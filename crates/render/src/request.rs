@@ -223,6 +223,12 @@ impl Request {
         self.silhouettes && self.technique.has_silhouettes()
     }
 
+    /// Whether nothing of a draw shows nearer than the geometry that is drawn, or its displaced surface.
+    pub(crate) fn is_solid(&self, material: &crate::Material) -> bool {
+        let on_mesh = !self.in_shell() && !self.technique.draws_geometry();
+        !on_mesh || !self.technique.displaces() || material.field.extent().base >= 1.0
+    }
+
     /// A picture with no further outputs.
     pub fn new(technique: TechniqueChoice, width: u32, height: u32) -> Self {
         Self {

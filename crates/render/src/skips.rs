@@ -12,9 +12,9 @@ impl Skips {
     pub const FRUSTUM: Self = Self(1);
     /// Clusters that turn their backs to the camera.
     pub const BACKFACE: Self = Self(1 << 1);
-    /// Clusters behind what is already drawn.
+    /// Draws and clusters behind walls.
     pub const OCCLUSION: Self = Self(1 << 2);
-    /// Fragments behind others: near things are drawn first, and hidden fragments are neither searched nor lit.
+    /// Light on what others hide: near draws come first.
     pub const DEPTH_FIRST: Self = Self(1 << 3);
     /// Marches over ground that is flat where the ray passes.
     pub const FLAT: Self = Self(1 << 4);
@@ -74,7 +74,7 @@ impl std::ops::Sub for Skips {
 }
 
 /// How much was left out of each kind: triangles for "frustum", "backface" and "occlusion", pixels for "flat",
-/// "parallax", "range" and "level", fragments for "depth_first", shadow rays for "shadow".
+/// "parallax", "range" and "level", draws moved ahead for "depth_first", shadow rays for "shadow".
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Skipped([u64; Skips::NAMED.len()]);
 

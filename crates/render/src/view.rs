@@ -77,7 +77,10 @@ impl<'a> ViewOf<'a> {
         let span = self.span(stand);
         if let Some(Fixed { pipeline, geometry, groups, triangles }) = &prepared.fixed {
             let runs = match groups {
-                Some(groups) => self.culling.visible(stand, groups, &mut stats.skipped),
+                Some(groups) => {
+                    let solid = self.request.is_solid(&draw.material);
+                    self.culling.visible(stand, groups, solid, &mut stats.skipped)
+                }
                 None => std::iter::once(0..*triangles).collect(),
             };
             if !runs.is_empty() {
@@ -115,10 +118,11 @@ impl<'a> ViewOf<'a> {
     }
 
     /// The calls in the order in which they are drawn.
-    pub fn calls(self) -> Vec<Call> {
+    pub fn calls(self, stats: &mut Stats) -> Vec<Call> {
         let mut calls = self.calls;
         if self.request.skips.contains(Skips::DEPTH_FIRST) {
-            nearest_first(&mut calls);
+            let moved = nearest_first(&mut calls);
+            stats.skipped.add(Skips::DEPTH_FIRST, moved as u64);
         }
         calls
     }
@@ -138,12 +142,15 @@ impl<'a> ViewOf<'a> {
 const FARTHEST_AHEAD: usize = 256;
 
 /// Moves what is nearer ahead, so that fewer hidden fragments are lit. Only past what is wholly behind it: of surfaces
-/// at the same depth the one that comes first in the scene shows, whatever the order.
-fn nearest_first(calls: &mut [Call]) {
+/// at the same depth the one that comes first in the scene shows, whatever the order. Says how many it moved.
+fn nearest_first(calls: &mut [Call]) -> usize {
+    let mut moved = 0;
     for at in 1..calls.len() {
         let [_, far] = calls[at].span;
         let behind = |call: &&Call| far * (1.0 + 1e-6) < call.span[0];
         let ahead = calls[..at].iter().rev().take(FARTHEST_AHEAD).take_while(behind).count();
         calls[at - ahead..=at].rotate_right(1);
+        moved += usize::from(ahead > 0);
     }
+    moved
 }
