@@ -259,8 +259,8 @@ def render(
         :data:`bumpwgpu.rendering.SKIPS`. ``frame.stats["skipped"]`` counts what was left out: triangles
         outside the picture ("frustum"), facing away ("backface") and behind walls ("occlusion"), draws
         moved ahead of what they hide ("depth_first"); pixels on flat ground ("flat"), with no visible
-        parallax ("parallax"), marched over less of their ray ("range") or a coarser map ("level"); shadow rays
-        that hide no light ("shadow").
+        parallax ("parallax"), marched over less of their ray ("range") or a coarser map ("level");
+        shadow rays that hide no light ("shadow").
     device : {"auto", "gpu"}
         Both render on the Vulkan device; the environment variable ``BUMPWGPU_ADAPTER`` picks one by
         a part of its name.
