@@ -141,7 +141,8 @@ def test_docstrings(name: str, thing: Any) -> None:
             assert parameter in body, f"{name} does not say what {parameter} is"
         assert "Raises\n---" in text, name
     if inspect.signature(thing).return_annotation not in ("None", None):
-        assert "Returns\n---" in text, name
+        kind = "Yields" if inspect.isgeneratorfunction(thing) else "Returns"
+        assert f"{kind}\n---" in text, name
 
 
 @pytest.mark.parametrize("module", [name for name in MODULES if name != "bumpwgpu.cli"])

@@ -307,6 +307,11 @@ def test_device_agrees_with_the_processor(technique: str) -> None:
     assert gpu.seconds > 0
     assert (cpu.status != gpu.status).mean() <= 1e-3
     both = (cpu.status == 0) & (gpu.status == 0)
+    if technique.endswith("_texel"):
+        # Published cones lead below the surface, where the last bits of a step decide where the search ends.
+        found = bw.march(hm, origins, ways, "exact").uv
+        both &= (np.abs(cpu.uv - found) * [96, 64] < 0.05).all(axis=1)
+    assert both.sum() > 500
     error = np.abs(cpu.uv[both] - gpu.uv[both]) * [96, 64]
     assert np.percentile(error, 99) < 0.01  # texels; measured 1e-4
 
