@@ -195,7 +195,7 @@ impl<'a, L: Lanes> Packet<'a, L> {
                     continue;
                 }
                 let site = [i + origin[0], j + origin[1]];
-                let mut lanes = L::bits(lanes & self.surely_rises_to(site, heights));
+                let mut lanes = L::bits(lanes);
                 let mut found = false;
                 while lanes != 0 {
                     found |= self.improve(lanes.trailing_zeros() as usize, site, heights);
@@ -208,29 +208,6 @@ impl<'a, L: Lanes> Packet<'a, L> {
             }
         }
         any
-    }
-
-    /// The test of [`Self::cells`] in double precision: on planes, where all rises are about as steep as the steepest, the
-    /// other one cannot tell them apart.
-    #[inline(always)]
-    fn surely_rises_to(&self, site: [i64; 2], heights: [f32; 4]) -> L::M {
-        let [du, dv] = self.grid.step.map(f64::from);
-        let mut u = [0.0; MOST];
-        for (lane, u) in u.iter_mut().enumerate() {
-            *u = (site[0] - self.first[0] - lane as i64) as f64 * du + 0.5 * du;
-        }
-        let vx = L::load_wide(&u);
-        let vy = L::splat_wide((site[1] - self.first[1]) as f64 * dv + 0.5 * dv);
-        let slope = L::widen(L::load(&self.slopes));
-        let low = L::widen(self.heights[0]);
-        let square = vx * vx + vy * vy;
-        let length = L::sqrt_wide(square);
-        let (along, across) = (slope * vx * L::splat_wide(0.5 * du), slope * vy * L::splat_wide(0.5 * dv));
-        let (sum, difference) = (along + across, along - across);
-        let [h00, h10, h01, h11] = heights.map(|height| L::splat_wide(f64::from(height)));
-        let upper = L::max_wide((h00 - low) * length + sum, (h10 - low) * length - difference);
-        let lower = L::max_wide((h01 - low) * length + difference, (h11 - low) * length - sum);
-        L::lt_wide(slope * square, L::max_wide(upper, lower))
     }
 
     /// Tries one cell for one lane; tells whether it was steeper.
