@@ -204,7 +204,9 @@ pub fn march_into(
     let n = origins.len();
     places.check(n)?;
     let exact = technique.info.reads == Reads::Pyramid;
-    let order = if exact { order::squares(field, origins, directions) } else { Vec::new() };
+    // Rays that start on the surface are followed one by one.
+    let side_by_side = exact && !options.from_surface;
+    let order = if side_by_side { order::squares(field, origins, directions) } else { Vec::new() };
     let size = if order.is_empty() { CHUNK } else { order.len() };
     let chunks: Vec<Chunk<'_>> = (0..n)
         .step_by(size)
