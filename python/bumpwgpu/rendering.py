@@ -46,11 +46,6 @@ SKIPS: tuple[str, ...] = (
     "backface",
     "occlusion",
     "depth_first",
-    "flat",
-    "parallax",
-    "range",
-    "level",
-    "shadow",
 )
 #: Longest side of a picture, in pixels.
 MAX_SIDE = 1 << 16
@@ -258,9 +253,7 @@ def render(
         What to leave out where the picture does not need it: all of it, nothing, or some of
         :data:`bumpwgpu.rendering.SKIPS`. ``frame.stats["skipped"]`` counts what was left out: triangles
         outside the picture ("frustum"), facing away ("backface") and behind walls ("occlusion"), draws
-        moved ahead of what they hide ("depth_first"); pixels on flat ground ("flat"), with no visible
-        parallax ("parallax"), marched over less of their ray ("range") or a coarser map ("level");
-        shadow rays that hide no light ("shadow").
+        moved ahead of what they hide ("depth_first").
     device : {"auto", "gpu"}
         Both render on the Vulkan device; the environment variable ``BUMPWGPU_ADAPTER`` picks one by
         a part of its name.

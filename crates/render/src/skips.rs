@@ -16,30 +16,15 @@ impl Skips {
     pub const OCCLUSION: Self = Self(1 << 2);
     /// Light on what others hide: near draws come first.
     pub const DEPTH_FIRST: Self = Self(1 << 3);
-    /// Marches over ground that is flat where the ray passes.
-    pub const FLAT: Self = Self(1 << 4);
-    /// Marches whose largest possible parallax nobody could see.
-    pub const PARALLAX: Self = Self(1 << 5);
-    /// The parts of rays above the highest and below the lowest height in reach.
-    pub const RANGE: Self = Self(1 << 6);
-    /// Levels of detail finer than a pixel.
-    pub const LEVEL: Self = Self(1 << 7);
-    /// Shadow rays that can hide no light.
-    pub const SHADOW: Self = Self(1 << 8);
     /// Everything that can be left out.
-    pub const ALL: Self = Self((1 << 9) - 1);
+    pub const ALL: Self = Self((1 << 4) - 1);
 
     /// Names with their sets, in the order of [`Skipped`].
-    pub const NAMED: [(&'static str, Self); 9] = [
+    pub const NAMED: [(&'static str, Self); 4] = [
         ("frustum", Self::FRUSTUM),
         ("backface", Self::BACKFACE),
         ("occlusion", Self::OCCLUSION),
         ("depth_first", Self::DEPTH_FIRST),
-        ("flat", Self::FLAT),
-        ("parallax", Self::PARALLAX),
-        ("range", Self::RANGE),
-        ("level", Self::LEVEL),
-        ("shadow", Self::SHADOW),
     ];
 
     /// The set of one kind by name.
@@ -73,8 +58,8 @@ impl std::ops::Sub for Skips {
     }
 }
 
-/// How much was left out of each kind: triangles for "frustum", "backface" and "occlusion", pixels for "flat",
-/// "parallax", "range" and "level", draws moved ahead for "depth_first", shadow rays for "shadow".
+/// How much was left out of each kind: triangles for "frustum", "backface" and "occlusion", draws moved ahead for
+/// "depth_first".
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Skipped([u64; Skips::NAMED.len()]);
 
@@ -117,12 +102,12 @@ mod tests {
         assert_eq!(all, Skips::ALL);
         assert_eq!(Skips::named("occlusion"), Some(Skips::OCCLUSION));
         assert_eq!(Skips::named("weather"), None);
-        assert!(!(Skips::ALL - Skips::FLAT).contains(Skips::FLAT));
+        assert!(!(Skips::ALL - Skips::BACKFACE).contains(Skips::BACKFACE));
 
         let mut skipped = Skipped::default();
-        skipped.add(Skips::SHADOW, 3);
-        skipped.add(Skips::SHADOW, 4);
-        assert_eq!((skipped.of(Skips::SHADOW), skipped.of(Skips::FLAT)), (7, 0));
-        assert_eq!(skipped.iter().filter(|(_, count)| *count > 0).collect::<Vec<_>>(), [("shadow", 7)]);
+        skipped.add(Skips::DEPTH_FIRST, 3);
+        skipped.add(Skips::DEPTH_FIRST, 4);
+        assert_eq!((skipped.of(Skips::DEPTH_FIRST), skipped.of(Skips::BACKFACE)), (7, 0));
+        assert_eq!(skipped.iter().filter(|(_, count)| *count > 0).collect::<Vec<_>>(), [("depth_first", 7)]);
     }
 }
