@@ -103,21 +103,11 @@ impl Camera {
         [corner, right * pixel, -up * pixel]
     }
 
-    /// Whether a ball in camera-relative world space lies wholly outside a picture of that aspect.
-    pub fn misses_ball(&self, aspect: f64, centre: DVec3, radius: f64) -> bool {
+    /// What is in a picture of that aspect.
+    pub(crate) fn frustum(&self, aspect: f64) -> Frustum {
         let (right, up, forward) = self.axes();
-        let tangent_y = (0.5 * self.fov_y).tan();
-        let tangent_x = tangent_y * aspect;
-        if centre.dot(forward) < -radius {
-            return true;
-        }
-        [(right, tangent_x), (-right, tangent_x), (up, tangent_y), (-up, tangent_y)].iter().any(
-            |&(side, tangent)| {
-                // Outward normal of the side plane through the eye.
-                let outward = (side - forward * tangent) / tangent.hypot(1.0);
-                centre.dot(outward) > radius
-            },
-        )
+        let tangent = (0.5 * self.fov_y).tan();
+        Frustum { right, up, forward, tangents: [tangent * aspect, tangent] }
     }
 
     /// Unit direction through the middle of a pixel, world axes.
@@ -128,5 +118,31 @@ impl Camera {
         let across = (2.0 * (f64::from(x) + 0.5) / width - 1.0) * tangent * width / height;
         let above = (1.0 - 2.0 * (f64::from(y) + 0.5) / height) * tangent;
         (forward + right * across + up * above).normalize().as_vec3()
+    }
+}
+
+/// The part of the world that a picture shows, without an end, around the camera.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Frustum {
+    /// Unit axes of the camera.
+    pub right: DVec3,
+    pub up: DVec3,
+    pub forward: DVec3,
+    /// Half the picture's extent across and down at distance 1.
+    tangents: [f64; 2],
+}
+
+impl Frustum {
+    /// Whether a ball in camera-relative world space lies wholly outside.
+    pub fn misses(&self, centre: DVec3, radius: f64) -> bool {
+        if centre.dot(self.forward) < -radius {
+            return true;
+        }
+        let ways = [(self.right, 0), (-self.right, 0), (self.up, 1), (-self.up, 1)];
+        ways.iter().any(|&(side, axis)| {
+            let tangent = self.tangents[axis];
+            // Outward normal of the side plane through the eye.
+            centre.dot(side - self.forward * tangent) > radius * tangent.hypot(1.0)
+        })
     }
 }

@@ -8,6 +8,7 @@ use std::ops::Range;
 
 use glam::{DMat4, DVec3};
 
+use crate::camera::Frustum;
 use crate::clusters::Cluster;
 use crate::walls::{Screen, Wall};
 use crate::{Camera, Skipped, Skips};
@@ -21,11 +22,7 @@ const MOST_SCREENS: usize = 16;
 /// A view, and what may be left out of it.
 pub(crate) struct Culling {
     skips: Skips,
-    right: DVec3,
-    up: DVec3,
-    forward: DVec3,
-    /// Half the picture's extent at distance 1.
-    tangents: [f64; 2],
+    frustum: Frustum,
     size: [f64; 2],
     /// Pixels that a unit at distance 1 covers.
     focal: f64,
@@ -92,17 +89,12 @@ pub(crate) struct Outline {
 
 impl Culling {
     pub fn new(camera: &Camera, size: [u32; 2], skips: Skips) -> Self {
-        let (right, up, forward) = camera.axes();
         let [width, height] = size.map(f64::from);
-        let tangent = (0.5 * camera.fov_y).tan();
         Self {
             skips,
-            right,
-            up,
-            forward,
-            tangents: [tangent * width / height, tangent],
+            frustum: camera.frustum(width / height),
             size: [width, height],
-            focal: height / (2.0 * tangent),
+            focal: height / (2.0 * (0.5 * camera.fov_y).tan()),
             near: camera.near(),
             off: SNAP + width.max(height) * 1e-6,
             screens: Vec::new(),
@@ -111,7 +103,8 @@ impl Culling {
 
     /// The outline of a ball around a point relative to the camera; `None` where it reaches the near plane.
     pub fn outline(&self, centre: DVec3, radius: f64) -> Option<Outline> {
-        let [x, y, z] = [self.right, -self.up, self.forward].map(|axis| centre.dot(axis));
+        let Frustum { right, up, forward, .. } = self.frustum;
+        let [x, y, z] = [right, -up, forward].map(|axis| centre.dot(axis));
         let (near, far) = (z - radius, z + radius);
         if near <= self.near {
             return None;
@@ -129,18 +122,8 @@ impl Culling {
 
     /// Whether a ball relative to the camera covers no pixel's middle.
     fn is_outside(&self, centre: DVec3, radius: f64) -> bool {
-        let depth = centre.dot(self.forward);
-        if depth < -radius {
-            return true;
-        }
-        let ways = [(self.right, 0), (-self.right, 0), (self.up, 1), (-self.up, 1)];
-        let beside = ways.iter().any(|&(side, axis)| {
-            let tangent = self.tangents[axis];
-            // Outward normal of the side plane through the eye.
-            centre.dot(side - self.forward * tangent) > radius * tangent.hypot(1.0)
-        });
-        // Between the middles of pixels, which are at halves.
-        beside
+        // Beside the picture, or between the middles of pixels, which are at halves.
+        self.frustum.misses(centre, radius)
             || self.outline(centre, radius).is_some_and(|outline| {
                 [0, 1]
                     .iter()
@@ -164,14 +147,14 @@ impl Culling {
         }
         let centre = stand.relative_from_object.transform_point3(group.centre);
         let radius = group.radius * stand.stretch;
-        let depth = centre.dot(self.forward);
+        let depth = centre.dot(self.frustum.forward);
         let (near, far) = (depth - radius, depth + radius);
         if near <= self.near {
             return false;
         }
         // Twice a triangle's area in pixels is the volume between it and the eye over the three depths, and less
         // than the longest side times what its corners may be off is not clear.
-        let aside = ((centre - self.forward * depth).length() + radius) / near;
+        let aside = ((centre - self.frustum.forward * depth).length() + radius) / near;
         let area = self.focal * stand.volume * group.least_height * behind / (far * far * far);
         let rounded = 3.0 * (self.off + self.focal * aside * 2e-6) * stand.stretch * aside.hypot(1.0) / near;
         area > 2.0 * rounded
@@ -185,7 +168,7 @@ impl Culling {
     /// Takes a wall of a draw into account. `middle`: of its mesh; `depth`: how deep its relief goes, mesh units.
     pub fn add_wall(&mut self, wall: &Wall, stand: &Stand, middle: DVec3, depth: f64) {
         if self.skips.contains(Skips::OCCLUSION) {
-            self.screens.extend(Screen::new(wall, stand, middle, depth, self.forward, self.near));
+            self.screens.extend(Screen::new(wall, stand, middle, depth, self.frustum.forward, self.near));
         }
     }
 

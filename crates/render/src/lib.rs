@@ -15,6 +15,7 @@ mod culling;
 pub mod device;
 pub mod error;
 pub mod frame;
+mod frame_binding;
 mod geometry;
 pub mod heights;
 pub mod held;

@@ -17,6 +17,8 @@ pub(crate) struct View<'a> {
     pub camera: &'a Camera,
     /// From the centred mesh.
     pub relative_from_object: DMat4,
+    /// Longest stretch of that transform, or more.
+    pub stretch: f64,
     /// Middle of the mesh.
     pub centre: DVec3,
     /// Pixels across and down.
@@ -28,13 +30,6 @@ pub(crate) struct View<'a> {
 impl View<'_> {
     fn relative(&self, position: glam::Vec3) -> DVec3 {
         self.relative_from_object.transform_point3(position.as_dvec3() - self.centre)
-    }
-
-    /// Longest stretch of the transform.
-    fn stretch(&self) -> f64 {
-        let m = &self.relative_from_object;
-        // The Frobenius norm is never less.
-        [m.x_axis, m.y_axis, m.z_axis].map(|axis| axis.truncate().length_squared()).iter().sum::<f64>().sqrt()
     }
 
     /// World units that a pixel covers at distance 1.
@@ -53,8 +48,8 @@ pub(crate) fn displaced(
     let field = &draw.material.field;
     let extent = field.extent();
     let texels = [field.width() as f64, field.height() as f64];
-    let reach = f64::from(extent.scale) * view.stretch();
-    let aspect = f64::from(view.size[0]) / f64::from(view.size[1]);
+    let reach = f64::from(extent.scale) * view.stretch;
+    let frustum = view.camera.frustum(f64::from(view.size[0]) / f64::from(view.size[1]));
     let keep = |face: u32| {
         if !view.culled {
             return true;
@@ -63,7 +58,7 @@ pub(crate) fn displaced(
             draw.mesh.indices[face as usize].map(|at| view.relative(draw.mesh.positions[at as usize]));
         let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
         let radius = corners.iter().map(|corner| corner.distance(centre)).fold(0.0, f64::max);
-        !view.camera.misses_ball(aspect, centre, radius + reach)
+        !frustum.misses(centre, radius + reach)
     };
     let relief = Relief {
         height: &|u, v| field.height_at(u, v),

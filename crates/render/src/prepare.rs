@@ -6,7 +6,7 @@ use std::num::NonZeroU64;
 use std::sync::Arc;
 use std::time::Instant;
 
-use glam::{DVec3, Vec4};
+use glam::DVec3;
 use mesh::Mesh;
 
 use crate::clusters::{Cluster, Clusters};
@@ -18,8 +18,8 @@ use crate::request::Program;
 use crate::shell::Shell;
 use crate::targets::TargetSet;
 use crate::triangles::Triangles;
-use crate::uniforms::{DrawInfo, LightInfo};
-use crate::{Device, Draw, Light, RenderError, Request, Scene, Stats, TechniqueChoice};
+use crate::uniforms::DrawInfo;
+use crate::{Device, Draw, RenderError, Request, Stats, TechniqueChoice};
 
 /// What is drawn of a draw the same way in all views.
 pub(crate) struct Fixed {
@@ -144,12 +144,6 @@ impl Shared {
         let material = entry(&mut self.materials, MaterialKey::new(&draw.material, program), || {
             material_group(device, &draw.material, program, request.horizon, stats)
         })?;
-        let mut compiled = |program| {
-            let before = Instant::now();
-            let pipeline = device.pipeline(key(program));
-            stats.compile_ms += before.elapsed().as_secs_f64() * 1e3;
-            pipeline
-        };
         if !has_shell {
             let locations = attributes(program.entry);
             let geometry = entry(&mut self.meshes, (address(&draw.mesh), locations), || {
@@ -157,7 +151,7 @@ impl Shared {
             })?;
             let Run { indices, groups } = self.run(device, draw, middle)?;
             let fixed = Fixed {
-                pipeline: compiled(program)?,
+                pipeline: compiled(device, key(program), stats)?,
                 geometry: Geometry { attributes: geometry, indices },
                 triangles: draw.triangles.end - draw.triangles.start,
                 groups: Some(groups),
@@ -169,7 +163,7 @@ impl Shared {
         let cut = Program { entry: "displaced", ..program };
         let cutting = Some(Cutting { key: key(cut), only_bridges: in_shell });
         let fixed = if in_shell {
-            let pipeline = compiled(Program { entry: "shell", ..program })?;
+            let pipeline = compiled(device, key(Program { entry: "shell", ..program }), stats)?;
             Some(Fixed { pipeline, geometry: cuboid, triangles: CUBOID.len() as u32, groups: None })
         } else {
             None
@@ -201,6 +195,18 @@ impl Shared {
             })
         })
     }
+}
+
+/// The pipeline of that key, and the time that it takes to compile it where it is new.
+pub(crate) fn compiled(
+    device: &Device,
+    key: PipelineKey,
+    stats: &mut Stats,
+) -> Result<Arc<Pipeline>, RenderError> {
+    let before = Instant::now();
+    let pipeline = device.pipeline(key);
+    stats.compile_ms += before.elapsed().as_secs_f64() * 1e3;
+    pipeline
 }
 
 fn key(draw: &Draw<'_>, request: &Request, program: Program, shadows: bool) -> PipelineKey {
@@ -252,28 +258,4 @@ fn place_group(
             entries: &entries,
         }))
     })
-}
-
-/// The lights as the shaders want them; never empty, since a buffer must not be.
-pub(crate) fn light_infos(scene: &Scene<'_>, eye: DVec3) -> Vec<LightInfo> {
-    let mut infos: Vec<LightInfo> = scene
-        .lights
-        .iter()
-        .map(|light| {
-            let (place, color, intensity) = match *light {
-                Light::Directional { direction, color, intensity } => {
-                    ((-direction.as_dvec3().normalize()).extend(0.0).as_vec4(), color, intensity)
-                }
-                Light::Point { position, color, intensity } => {
-                    ((position - eye).extend(1.0).as_vec4(), color, intensity)
-                }
-            };
-            let [r, g, b] = color;
-            LightInfo { place, color: Vec4::new(r, g, b, 0.0) * intensity }
-        })
-        .collect();
-    if infos.is_empty() {
-        infos.push(LightInfo { place: Vec4::Z, color: Vec4::ZERO });
-    }
-    infos
 }

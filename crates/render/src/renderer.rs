@@ -4,19 +4,18 @@ use std::collections::{HashMap, VecDeque};
 use std::sync::Arc;
 use std::time::Instant;
 
-use bytemuck::Zeroable;
-use glam::{DMat4, Vec4};
+use glam::DMat4;
 use heightfield::HeightField;
 
 use crate::culling::{Culling, Stand};
+use crate::frame_binding::FrameBinding;
 use crate::geometry::Room;
-use crate::heights::bind;
-use crate::prepare::{self, Prepared, Shared, address};
+use crate::prepare::{Prepared, Shared, address};
 use crate::readback::Readback;
 use crate::tally::Tally;
 use crate::targets::{TargetSet, Targets};
 use crate::timer::Timer;
-use crate::uniforms::{DrawInfo, FrameInfo};
+use crate::uniforms::DrawInfo;
 use crate::unpack::Unpacker;
 use crate::view::{Call, ViewOf};
 use crate::{Camera, Device, Frame, Held, RenderError, Request, Scene, Skips, Stats, tally};
@@ -314,17 +313,15 @@ impl<'a> Renderer<'a> {
             }
             let Some(prepared) = &self.draws[at] else { continue };
             if view.add(at, draw, middle, prepared, &stand, places.len() as u32, stats, warnings)? {
-                places.extend_from_slice(bytemuck::bytes_of(&place(&stand)));
+                places.extend_from_slice(bytemuck::bytes_of(&DrawInfo::of(stand.relative_from_object)));
                 places.resize(places.len().next_multiple_of(stride), 0);
             }
         }
         stats.triangles_culled = stats.skipped.culled();
-        let lights = prepare::light_infos(&self.scene, camera.eye);
-        let lights: &[u8] = bytemuck::cast_slice(&lights);
-        tally::uploaded((lights.len() + places.len()) as u64);
+        tally::uploaded(places.len() as u64);
         self.device.guard("placing draws", || {
             self.device.queue.write_buffer(&self.shared.places, 0, &places);
-            self.device.queue.write_buffer(&self.frame.lights, 0, lights);
+            self.frame.write_lights(&self.device, &self.scene, camera.eye);
             Ok(())
         })?;
         Ok(view.calls(stats))
@@ -395,66 +392,5 @@ impl<'a> Renderer<'a> {
         stats.readback_ms += before.elapsed().as_secs_f64() * 1e3;
         self.spare.push(readback);
         Ok(())
-    }
-}
-
-fn place(stand: &Stand) -> DrawInfo {
-    let object_from_relative = stand.relative_from_object.inverse();
-    DrawInfo {
-        relative_from_object: stand.relative_from_object.as_mat4(),
-        object_from_relative: object_from_relative.as_mat4(),
-        eye: object_from_relative.w_axis.as_vec4(),
-    }
-}
-
-/// Group 0.
-struct FrameBinding {
-    info: wgpu::Buffer,
-    lights: wgpu::Buffer,
-    group: wgpu::BindGroup,
-}
-
-impl FrameBinding {
-    fn new(device: &Device, scene: &Scene<'_>) -> Result<Self, RenderError> {
-        let blank = FrameInfo::zeroed();
-        let info = device.buffer_with("frame", bytemuck::bytes_of(&blank), wgpu::BufferUsages::UNIFORM)?;
-        let lights = prepare::light_infos(scene, scene.camera.eye);
-        let lights =
-            device.buffer_with("lights", bytemuck::cast_slice(&lights), wgpu::BufferUsages::STORAGE)?;
-        let group = device.guard("binding the frame", || {
-            Ok(device.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("frame"),
-                layout: &device.layouts.frame,
-                entries: &[bind(0, info.as_entire_binding()), bind(1, lights.as_entire_binding())],
-            }))
-        })?;
-        Ok(Self { info, lights, group })
-    }
-
-    fn write(
-        &self,
-        device: &Device,
-        scene: &Scene<'_>,
-        request: &Request,
-        camera: &Camera,
-        first_row: u32,
-        rows: u32,
-    ) {
-        let [r, g, b] = scene.ambient;
-        let size = [request.width, request.height];
-        let directions = camera.pixel_directions(size, first_row);
-        let [corner, pixel_right, pixel_down] = directions.map(|direction| direction.extend(0.0).as_vec4());
-        let info = FrameInfo {
-            clip_from_relative: camera.clip_from_relative(size, first_row, rows).as_mat4(),
-            corner,
-            pixel_right,
-            pixel_down,
-            forward: camera.forward().extend(camera.near()).as_vec4(),
-            ambient: Vec4::new(r, g, b, 0.0),
-            light_count: scene.lights.len() as u32,
-            ..FrameInfo::zeroed()
-        };
-        tally::uploaded(size_of::<FrameInfo>() as u64);
-        device.queue.write_buffer(&self.info, 0, bytemuck::bytes_of(&info));
     }
 }

@@ -1,7 +1,7 @@
 //! Structs shared with the shaders. A test compares them with naga's layout.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{Mat4, Vec4};
+use glam::{DMat4, Mat4, Vec4};
 
 /// Twin of `FrameInfo` in `shaders_wgsl/bindings/frame.wgsl`.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -49,6 +49,18 @@ pub struct DrawInfo {
     pub object_from_relative: Mat4,
     /// Camera in the space of the centred mesh.
     pub eye: Vec4,
+}
+
+impl DrawInfo {
+    /// Of a mesh that stands there.
+    pub(crate) fn of(relative_from_object: DMat4) -> Self {
+        let object_from_relative = relative_from_object.inverse();
+        Self {
+            relative_from_object: relative_from_object.as_mat4(),
+            object_from_relative: object_from_relative.as_mat4(),
+            eye: object_from_relative.w_axis.as_vec4(),
+        }
+    }
 }
 
 /// Twin of `MeshVertex` in `shaders_wgsl/bindings/triangles.wgsl`.

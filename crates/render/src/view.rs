@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 use std::sync::Arc;
-use std::time::Instant;
 
 use glam::DVec3;
 
@@ -10,7 +9,7 @@ use crate::culling::{Culling, Stand};
 use crate::geometry::Geometry;
 use crate::micro::{self, View};
 use crate::pipeline::Pipeline;
-use crate::prepare::{Cutting, Fixed, Prepared};
+use crate::prepare::{Cutting, Fixed, Prepared, compiled};
 use crate::{Camera, Device, Draw, RenderError, Request, Skips, Stats};
 
 /// One program over some triangles of a draw.
@@ -92,6 +91,7 @@ impl<'a> ViewOf<'a> {
             let view = View {
                 camera: self.camera,
                 relative_from_object: stand.relative_from_object,
+                stretch: stand.stretch,
                 centre: middle,
                 size: [self.request.width, self.request.height],
                 culled: self.request.skips.contains(Skips::FRUSTUM),
@@ -103,9 +103,7 @@ impl<'a> ViewOf<'a> {
                 ));
             }
             if !displaced.indices.is_empty() {
-                let started = Instant::now();
-                let pipeline = self.device.pipeline(key.clone())?;
-                stats.compile_ms += started.elapsed().as_secs_f64() * 1e3;
+                let pipeline = compiled(self.device, key.clone(), stats)?;
                 let geometry = Geometry::micro(self.device, &displaced)?;
                 let runs = std::iter::once(0..displaced.indices.len() as u32).collect();
                 self.calls.push(Call { draw: at, pipeline, geometry, runs, offset, span });
