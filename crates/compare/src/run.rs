@@ -78,9 +78,9 @@ struct Cell {
 ///
 /// The reference is found once for each elevation, and kept for the next comparison. Times are taken in
 /// turns - repeat by repeat over all settings, every other time backwards - so that a machine that slows
-/// down is fair to all; each is the least of a few passes. The formats of maps are measured for what they do to errors; on the CPU all are
-/// marched as 32-bit floats, so that a setting that differs from another in its formats alone takes over
-/// the other's times.
+/// down is fair to all; each is the least of a few passes. The formats of maps are measured for what they
+/// do to errors; on the CPU all are marched as 32-bit floats, so that a setting that differs from another in
+/// its formats alone takes over the other's times.
 ///
 /// Rows come setting by setting: one for each elevation, then one for all of them together.
 ///
