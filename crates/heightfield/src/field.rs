@@ -2,6 +2,8 @@
 
 use std::sync::OnceLock;
 
+use rayon::prelude::*;
+
 use crate::baked::{BakedMap, BakedMaps};
 use crate::cone_map::{ConeKind, ConeMap};
 use crate::distance_map::DistanceMap;
@@ -128,7 +130,10 @@ impl HeightField {
                 got: texels.len(),
             });
         }
-        if let Some(at) = texels.iter().position(|h| !(0.0..=1.0).contains(h)) {
+        let sound = |row: &[f32]| row.iter().fold(true, |sound, h| sound & (0.0..=1.0).contains(h));
+        if let Some(at) = texels.par_chunks(width).position_first(|row| !sound(row)).and_then(|row| {
+            texels[row * width..].iter().position(|h| !(0.0..=1.0).contains(h)).map(|at| row * width + at)
+        }) {
             return Err(HeightFieldError::Height { row: at / width, column: at % width, value: texels[at] });
         }
         let cells = match wrap {
@@ -141,11 +146,22 @@ impl HeightField {
             return Err(HeightFieldError::Cells { width, height, wrap });
         }
         let first = Self::first_texel_of(wrap);
-        let mut corners = Vec::with_capacity((cells[0] + 1) * (cells[1] + 1));
-        for j in 0..=cells[1] as i64 {
-            let row = wrap.index(j + first, height) * width;
-            corners.extend((0..=cells[0] as i64).map(|i| texels[row + wrap.index(i + first, width)]));
-        }
+        let mut corners = vec![0.0; (cells[0] + 1) * (cells[1] + 1)];
+        corners.par_chunks_mut(cells[0] + 1).enumerate().for_each(|(j, to)| {
+            let row = &texels[wrap.index(j as i64 + first, height) * width..][..width];
+            let before = usize::from(wrap == Wrap::Clamp);
+            to[..before].fill(row[0]);
+            to[before..][..width].copy_from_slice(row);
+            let behind = &mut to[before + width..];
+            match wrap {
+                Wrap::Repeat => behind.fill(row[0]),
+                Wrap::Clamp => behind.fill(row[width - 1]),
+                Wrap::Mirror => {
+                    behind.iter_mut().zip(row.iter().rev()).for_each(|(to, &from)| *to = from);
+                    behind[width] = row[0];
+                }
+            }
+        });
         Ok(Self {
             width,
             height,

@@ -6,7 +6,7 @@
 use rayon::prelude::*;
 
 use crate::HeightField;
-use crate::pyramid::{Level, MaxPyramid};
+use crate::pyramid::{Level, MaxPyramid, halve, larger, smaller};
 
 /// The drop from the highest point that is free of surface under each node and around it.
 ///
@@ -46,7 +46,8 @@ impl Margins {
     pub fn build(field: &HeightField) -> Self {
         let pyramid = field.pyramid();
         let widest = WIDEST.min(pyramid.levels().len() - 1);
-        Self { pyramids: (0..=widest).map(|margin| MarginPyramid::build(field, pyramid, margin)).collect() }
+        let build = |margin| MarginPyramid::build(field, pyramid, margin);
+        Self { pyramids: (0..=widest).into_par_iter().map(build).collect() }
     }
 
     /// The one with a margin of one cell.
@@ -72,16 +73,10 @@ impl MarginPyramid {
         let top = (levels.len() - 1).min(LEVELS - 1);
         let margin = margin.min(top);
         let finest = margin.max(FINEST).min(top);
-        let total = levels[finest..=top].iter().map(|level| level.nodes[0] * level.nodes[1]).sum();
-        let widened = widen(field, pyramid, margin);
-        let mut drops = Vec::with_capacity(total);
-        if finest == margin {
-            drops = widened;
-            drops.reserve_exact(total - drops.len());
-        } else {
-            drops.resize(levels[finest].nodes[0] * levels[finest].nodes[1], 0.0);
-            reduce(&widened, levels[margin].nodes, &mut drops, levels[finest].nodes);
-        }
+        let total: usize = levels[finest..=top].iter().map(|level| level.nodes[0] * level.nodes[1]).sum();
+        let mut drops = vec![0.0; levels[finest].nodes[0] * levels[finest].nodes[1]];
+        drops.reserve_exact(total - drops.len());
+        Widened::new(field, pyramid, margin).fill(&mut drops, levels[finest].nodes[0], finest > margin);
         let (mut offsets, mut strides) = ([0; LEVELS], [0; LEVELS]);
         strides[..=finest].fill(levels[finest].nodes[0] as i32);
         let mut at = 0;
@@ -141,39 +136,64 @@ impl MarginPyramid {
     }
 }
 
-/// The drops of the level whose nodes are as wide as the margin.
-fn widen(field: &HeightField, pyramid: &MaxPyramid, margin: usize) -> Vec<f32> {
-    let base = &pyramid.levels()[margin];
-    let [w, h] = base.nodes;
-    let highest = pyramid.highest();
-    let source = &pyramid.maxima()[base.offset..base.offset + w * h];
-    let neighbours_x = Neighbours::new(field.cells()[0], w, margin, field.is_periodic());
-    let neighbours_y = Neighbours::new(field.cells()[1], h, margin, field.is_periodic());
-    let mut along_x = vec![0.0_f32; w * h];
-    along_x.par_chunks_mut(w).zip(source.par_chunks(w)).for_each(|(to, from)| neighbours_x.row(from, to));
-    let mut drops = vec![0.0_f32; w * h];
-    drops.par_chunks_mut(w).enumerate().for_each(|(b, to)| {
-        to.copy_from_slice(&along_x[b * w..][..w]);
-        for other in neighbours_y.of(b) {
-            for (to, &from) in to.iter_mut().zip(&along_x[other * w..][..w]) {
-                *to = if *to > from { *to } else { from };
+/// The maxima of the level whose nodes are as wide as the margin, over each node and those around it.
+struct Widened<'a> {
+    source: &'a [f32],
+    nodes: [usize; 2],
+    highest: f32,
+    x: Neighbours,
+    y: Neighbours,
+}
+
+impl<'a> Widened<'a> {
+    fn new(field: &HeightField, pyramid: &'a MaxPyramid, margin: usize) -> Self {
+        let base = &pyramid.levels()[margin];
+        let [w, h] = base.nodes;
+        let [nx, ny] = field.cells();
+        let periodic = field.is_periodic();
+        Self {
+            source: &pyramid.maxima()[base.offset..][..w * h],
+            nodes: base.nodes,
+            highest: pyramid.highest(),
+            x: Neighbours::new(nx, w, margin, periodic),
+            y: Neighbours::new(ny, h, margin, periodic),
+        }
+    }
+
+    /// Writes the drops of these nodes, or of those twice as wide, to rows of `across` nodes.
+    fn fill(&self, drops: &mut [f32], across: usize, halved: bool) {
+        let [w, h] = self.nodes;
+        let scratch = || [vec![0.0; w], vec![0.0; w], vec![0.0; w]];
+        drops.par_chunks_mut(across).enumerate().for_each_init(scratch, |[tall, upper, lower], (b, to)| {
+            if halved {
+                self.row(2 * b, tall, upper);
+                self.row((2 * b + 1).min(h - 1), tall, lower);
+                halve(upper, lower, larger, to);
+            } else {
+                self.row(b, tall, to);
             }
+            for to in to {
+                *to = larger(self.highest - *to - SLACK, 0.0);
+            }
+        });
+    }
+
+    /// The maxima of row `b`; `tall` is for those along y alone.
+    fn row(&self, b: usize, tall: &mut [f32], to: &mut [f32]) {
+        let source = |b: usize| &self.source[b * self.nodes[0]..][..self.nodes[0]];
+        tall.copy_from_slice(source(b));
+        for other in self.y.of(b) {
+            tall.iter_mut().zip(source(other)).for_each(|(to, &from)| *to = larger(*to, from));
         }
-        for to in to.iter_mut() {
-            *to = (highest - *to - SLACK).max(0.0);
-        }
-    });
-    drops
+        self.x.row(tall, to);
+    }
 }
 
 fn reduce(from: &[f32], [w, h]: [usize; 2], to: &mut [f32], [across, _]: [usize; 2]) {
     to.par_chunks_mut(across).enumerate().for_each(|(b, row)| {
         let upper = &from[2 * b * w..][..w];
         let lower = &from[(2 * b + 1).min(h - 1) * w..][..w];
-        for (a, node) in row.iter_mut().enumerate() {
-            let (left, right) = (2 * a, (2 * a + 1).min(w - 1));
-            *node = upper[left].min(upper[right]).min(lower[left].min(lower[right]));
-        }
+        halve(upper, lower, smaller, row);
     });
 }
 
@@ -232,8 +252,7 @@ impl Neighbours {
             for ((to, &left), (&at, &right)) in
                 inner.iter_mut().zip(&from[1..]).zip(from[2..].iter().zip(&from[3..]))
             {
-                let larger = if left > right { left } else { right };
-                *to = if at > larger { at } else { larger };
+                *to = larger(at, larger(left, right));
             }
         }
     }

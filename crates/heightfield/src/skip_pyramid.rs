@@ -10,6 +10,7 @@
 use rayon::prelude::*;
 
 use crate::HeightField;
+use crate::pyramid::{halve, larger};
 
 /// Highest points of a quadtree over one period of the map.
 ///
@@ -73,11 +74,11 @@ impl SkipPyramid {
             if aligned {
                 for (i, maximum) in maxima.iter_mut().enumerate() {
                     let [a, b, c, d] = [0, 1, 2, 3].map(|k| extended[i + k]);
-                    *maximum = max(max(a, b), max(c, d));
+                    *maximum = larger(larger(a, b), larger(c, d));
                 }
             } else {
                 for (&[from, to], maximum) in across.iter().zip(maxima) {
-                    *maximum = extended[from..to].iter().copied().fold(0.0, max);
+                    *maximum = extended[from..to].iter().copied().fold(0.0, larger);
                 }
             }
         });
@@ -91,7 +92,7 @@ impl SkipPyramid {
                     (j, false) => j.unwrap_or(0).min(rows),
                 };
                 for (maximum, &height) in maxima.iter_mut().zip(&along_x[j * nx..(j + 1) * nx]) {
-                    *maximum = max(*maximum, height);
+                    *maximum = larger(*maximum, height);
                 }
             }
         });
@@ -110,13 +111,10 @@ impl SkipPyramid {
             let lower = &fine[lower * finer_x..][..finer_x];
             if finer_x == nx {
                 for ((maximum, &h), &k) in maxima.iter_mut().zip(upper).zip(lower) {
-                    *maximum = max(h, k);
+                    *maximum = larger(h, k);
                 }
             } else {
-                let pairs = upper.as_chunks::<2>().0.iter().zip(lower.as_chunks::<2>().0);
-                for (maximum, (&[a, b], &[c, d])) in maxima.iter_mut().zip(pairs) {
-                    *maximum = max(max(a, b), max(c, d));
-                }
+                halve(upper, lower, larger, maxima);
             }
         });
     }
@@ -172,12 +170,6 @@ fn reach(a: usize, n: usize, cells: usize) -> [usize; 2] {
     let from = (2 * a * cells + n) / (2 * n);
     let to = (2 * (a + 1) * cells + 3 * n).div_ceil(2 * n);
     [from, to + 1]
-}
-
-/// The maximum of two heights. They are never NaN, and this compiles to one instruction.
-#[inline(always)]
-fn max(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
 }
 
 #[cfg(test)]
