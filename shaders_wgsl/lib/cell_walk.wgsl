@@ -5,7 +5,7 @@
 #import "lib/walk_axis.wgsl"
 
 // Farther than this, in cells, 32 bits no longer tell cells apart.
-const FARTHEST: f32 = 1e9;
+const FARTHEST: f32 = 16777216.0;
 // Farther from the surface than this, a start is not on it.
 const ON_SURFACE: f32 = 1e-3;
 // A light ray that enters a cell this close to its surface still leaves the point it started from: 8 ulps of 1.

@@ -30,6 +30,8 @@ pub struct Chunk<'a> {
 pub(crate) struct Outcome<L: Lanes> {
     /// Which met the surface.
     pub hit: L::M,
+    /// Which of the others are unconverged.
+    pub unconverged: L::M,
     /// Ray parameter of the hit.
     pub t: L::D,
     /// Height reads or nodes visited.
@@ -105,9 +107,13 @@ impl Chunk<'_> {
             each(bits, |lane| out[at + lane] = steps[lane] as u32);
         }
         if let Some(out) = &mut self.status {
-            let hit = L::bits(outcome.hit);
+            let (hit, unconverged) = (L::bits(outcome.hit), L::bits(outcome.unconverged));
             each(bits, |lane| {
-                out[at + lane] = if hit >> lane & 1 == 1 { Status::Hit } else { Status::Left } as u8;
+                out[at + lane] = match (hit >> lane & 1, unconverged >> lane & 1) {
+                    (1, _) => Status::Hit,
+                    (_, 1) => Status::Unconverged,
+                    _ => Status::Left,
+                } as u8;
             });
         }
         if self.uv.is_none() && self.z.is_none() && self.normal.is_none() {

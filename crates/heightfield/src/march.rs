@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use rayon::prelude::*;
 
 use crate::chunk::Chunk;
-use crate::lanes::{self, Kernel, Lanes};
+use crate::lanes;
 use crate::order;
 use crate::packet;
 use crate::rays::{fault_of, first_unsound, same_count};
@@ -54,33 +54,6 @@ pub fn period(wrap: Wrap) -> f64 {
         Wrap::Repeat => 1.0,
         Wrap::Mirror => 2.0,
         Wrap::Clamp => 0.0,
-    }
-}
-
-/// Runs a search that is written for one ray on every ray, with the best instructions the processor has.
-///
-/// They only bring cheap rounding and conversions here, and change no bit.
-pub(crate) fn march_by_segments<S: Search>(search: &S, field: &HeightField, chunk: &mut Chunk<'_>) {
-    lanes::dispatch(BySegments { search, field, chunk });
-}
-
-struct BySegments<'a, 'b, S> {
-    search: &'a S,
-    field: &'a HeightField,
-    chunk: &'a mut Chunk<'b>,
-}
-
-impl<S: Search> Kernel for BySegments<'_, '_, S> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<L: Lanes>(self) {
-        for i in 0..self.chunk.origins.len() {
-            if self.chunk.cancelled() {
-                return;
-            }
-            march_one(self.search, self.field, self.chunk, i);
-        }
     }
 }
 

@@ -73,7 +73,8 @@ fn write<L: Lanes>(field: &HeightField, chunk: &mut Chunk<'_>, results: &Results
         let t = (drop - (highest - origin[2])) * (L::splat_wide(-1.0) / direction[2]);
         // False for NaN.
         let hit = L::first(n - at) & L::le_wide(drop, drop);
-        let outcome = Outcome::<L> { hit, t, steps: L::load_int(&results.steps[at..]) };
+        let outcome =
+            Outcome::<L> { hit, unconverged: L::first(0), t, steps: L::load_int(&results.steps[at..]) };
         chunk.write_all(field, at, hit, &outcome, origin, direction);
     }
 }

@@ -8,7 +8,10 @@
 use glam::Vec3;
 
 use super::Search;
+use super::cell_walk::trace;
 use super::cone_walk::ConeWalk;
+use crate::chunk::Chunk;
+use crate::wide::leaps;
 use crate::{ConeKind, Found, HeightField};
 
 technique! {
@@ -19,10 +22,22 @@ technique! {
     parameters { steps: 16384 in 1..=65536, "Most steps; a ray that needs more is unconverged."; }
 }
 
+impl Cone {
+    /// What it walks by.
+    #[inline(always)]
+    pub(crate) fn walk(&self) -> ConeWalk<false> {
+        ConeWalk { empty: ConeKind::Cone, relaxed: None, refine: 0, most_steps: self.steps }
+    }
+}
+
 impl Search for Cone {
     #[inline(always)]
     fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, _: f32, from_surface: bool) -> Found {
-        let walk = ConeWalk { empty: ConeKind::Cone, relaxed: None, refine: 0, most_steps: self.steps };
-        walk.trace::<false>(field, start, delta, from_surface)
+        trace(&self.walk(), field, start, delta, from_surface)
+    }
+
+    #[inline(always)]
+    fn march(&self, field: &HeightField, chunk: &mut Chunk<'_>) {
+        leaps::march(&self.walk(), self, field, chunk);
     }
 }

@@ -11,14 +11,13 @@
 //! halved a few times and what is left of it followed cell by cell. That holds for rays that do not
 //! rise; the others use empty cones.
 
-use glam::Vec3;
+use super::cell_walk::{CellWalk, Cells, Leap, Stand};
+use crate::lanes::Lanes;
+use crate::{ConeKind, HeightField};
 
-use super::cell_walk::{CellWalk, NOTHING, Patch};
-use crate::{ConeKind, Found, HeightField};
-
-/// What a walk reads, and how long it may take.
+/// What a walk reads, and how long it may take. `BILINEAR` when the ratios belong to corners.
 #[derive(Debug, Clone, Copy)]
-pub struct ConeWalk {
+pub struct ConeWalk<const BILINEAR: bool> {
     /// Map of empty cones.
     pub empty: ConeKind,
     /// Map of relaxed cones, if there are any.
@@ -29,98 +28,111 @@ pub struct ConeWalk {
     pub most_steps: u32,
 }
 
-/// The ratio for the point under the ray: of its cell, or interpolated between its corners.
+/// Ratios of empty cones, and of relaxed ones if there are any.
+#[derive(Clone, Copy)]
+pub struct Ratios<'a> {
+    empty: &'a [f32],
+    relaxed: Option<&'a [f32]>,
+}
+
+/// The ratios for the points under rays: of their cells, or interpolated between the corners of these.
 #[inline(always)]
-fn ratio<const BILINEAR: bool>(cones: &[f32], stride: usize, patch: &Patch) -> f32 {
-    let at = patch.id[1] * stride + patch.id[0];
+fn ratio<L: Lanes, const BILINEAR: bool>(
+    cones: &[f32],
+    cells: &Cells<'_, L>,
+    at: &Stand<L>,
+    chosen: L::M,
+) -> L::F {
+    let patch = &at.patch;
     if !BILINEAR {
-        return cones[at];
+        return cells.of(cones, patch.corner, chosen);
     }
     let [x, y] = patch.local;
-    let row = |at: usize| cones[at] + x * (cones[at + 1] - cones[at]);
-    let (upper, lower) = (row(at), row(at + stride));
+    let [c00, c10, c01, c11] = cells.around(cones, patch.corner);
+    let (upper, lower) = (c00 + x * (c10 - c00), c01 + x * (c11 - c01));
     upper + y * (lower - upper)
 }
 
-impl ConeWalk {
-    /// Follows a segment to the first point on or below the surface.
-    ///
-    /// `BILINEAR` when the ratios belong to corners. With `from_surface` the start lies on the surface and
-    /// is no hit. Nothing is found without the maps.
+impl<const BILINEAR: bool> Leap for ConeWalk<BILINEAR> {
+    type Maps<'a> = Ratios<'a>;
+
     #[inline(always)]
-    pub fn trace<const BILINEAR: bool>(
-        &self,
-        field: &HeightField,
-        start: Vec3,
-        delta: Vec3,
-        from_surface: bool,
-    ) -> Found {
-        let Some(mut open) = field.cone_map(self.empty) else { return NOTHING };
-        let relaxed = self.relaxed.is_some() && delta.z <= 0.0;
-        if let Some(kind) = self.relaxed {
-            let Some(wide) = field.cone_map(kind) else { return NOTHING };
-            open = if relaxed { wide } else { open };
-        }
-        let open = open.values();
-        let Some(mut ray) = CellWalk::new(field, start, delta, from_surface) else { return NOTHING };
-        let stride = field.cells()[0] + 1;
-        let dz = delta.z;
-        let lateral = (delta.x * delta.x + delta.y * delta.y).sqrt();
-        // Up to here the ray is followed cell by cell.
-        let mut closed_until = 0.0_f32;
-        for steps in 1..=self.most_steps {
-            let stand = ray.stand(field);
-            if stand.gap <= 0.0 && !stand.on_surface {
-                return Found::hit(ray.t, steps);
-            }
-            let mut jump = ray.t;
-            if stand.gap > 0.0 && ray.t >= closed_until {
-                let c = ratio::<BILINEAR>(open, stride, &stand.patch);
-                let closing = lateral - c * dz;
-                if closing > 0.0 {
-                    jump = ray.t + c * stand.gap / closing;
-                } else if c > 0.0 {
-                    jump = f32::INFINITY;
-                }
-            }
-            if jump == f32::INFINITY {
-                return Found::left(steps);
-            }
-            if jump > stand.exit() {
-                let (above, x, y) = (ray.t, ray.x, ray.y);
-                ray.jump(jump);
-                if relaxed && ray.z(jump) <= Patch::new(field, &ray.x, &ray.y, jump).height {
-                    (ray.t, ray.x, ray.y) = (above, x, y);
-                    closed_until = self.halve(field, &mut ray, jump);
-                }
-            } else if let Some(t) = ray.cross(&stand) {
-                return Found::hit(t, steps);
-            }
-            if ray.has_left() {
-                return Found::left(steps);
-            }
-        }
-        ray.unconverged(self.most_steps)
+    fn maps<'a>(&self, field: &'a HeightField) -> Option<Ratios<'a>> {
+        let empty = field.cone_map(self.empty)?.values();
+        let relaxed = match self.relaxed {
+            Some(kind) => Some(field.cone_map(kind)?.values()),
+            None => None,
+        };
+        Some(Ratios { empty, relaxed })
     }
 
-    /// Takes a ray closer to where it goes below the surface, which is before `below`; returns up to where
-    /// it is to be followed cell by cell.
     #[inline(always)]
-    fn halve(&self, field: &HeightField, ray: &mut CellWalk, mut below: f32) -> f32 {
+    fn most_steps(&self) -> u32 {
+        self.most_steps
+    }
+
+    /// Sideways, in UV units.
+    #[inline(always)]
+    fn pace<L: Lanes>(_: Ratios<'_>, delta: [L::F; 3]) -> L::F {
+        L::sqrt(delta[0] * delta[0] + delta[1] * delta[1])
+    }
+
+    #[inline(always)]
+    fn leap<L: Lanes>(maps: Ratios<'_>, rays: &CellWalk<L>, cells: &Cells<'_, L>, at: &Stand<L>) -> L::F {
+        let zero = L::splat(0.0);
+        let all = L::first(L::WIDTH);
+        let c = match maps.relaxed {
+            None => ratio::<L, BILINEAR>(maps.empty, cells, at, all),
+            Some(relaxed) => {
+                let falls = L::le(rays.rise(), zero);
+                let wide = ratio::<L, BILINEAR>(relaxed, cells, at, falls);
+                if L::any(rays.running & !falls) {
+                    L::select(falls, wide, ratio::<L, BILINEAR>(maps.empty, cells, at, !falls))
+                } else {
+                    wide
+                }
+            }
+        };
+        let closing = rays.pace - c * rays.rise();
+        let nears = L::lt(zero, closing);
+        let open = L::lt(zero, at.gap) & L::le(rays.closed_until, rays.t);
+        let jump = L::select(open & nears, rays.t + c * at.gap / closing, rays.t);
+        L::select(open & !nears & L::lt(zero, c), L::splat(f32::INFINITY), jump)
+    }
+
+    #[inline(always)]
+    fn land<L: Lanes>(&self, rays: &mut CellWalk<L>, cells: &Cells<'_, L>, chosen: L::M, jump: L::F) {
+        let above = *rays;
+        rays.jump(chosen, jump);
+        if self.relaxed.is_none() {
+            return;
+        }
+        let sunk = chosen & L::le(rays.rise(), L::splat(0.0)) & rays.below(cells, jump);
+        if L::any(sunk) {
+            *rays = rays.or(sunk, &above);
+            self.halve(rays, cells, sunk, jump);
+        }
+    }
+}
+
+impl<const BILINEAR: bool> ConeWalk<BILINEAR> {
+    /// Takes the chosen rays closer to where they go below the surface, which is before `below`; up to the
+    /// last position below it they are to be followed cell by cell.
+    #[inline(always)]
+    fn halve<L: Lanes>(&self, rays: &mut CellWalk<L>, cells: &Cells<'_, L>, chosen: L::M, mut below: L::F) {
+        let mut halving = chosen;
         for _ in 0..self.refine {
-            let middle = 0.5 * (ray.t + below);
-            let (mut x, mut y) = (ray.x, ray.y);
-            x.place(middle);
-            y.place(middle);
-            if x.cell == ray.x.cell && y.cell == ray.y.cell {
+            let middle = L::splat(0.5) * (rays.t + below);
+            let mut there = *rays;
+            there.jump(halving, middle);
+            halving = halving & !there.shares_cell(rays);
+            if !L::any(halving) {
                 break;
             }
-            if ray.z(middle) <= Patch::new(field, &x, &y, middle).height {
-                below = middle;
-            } else {
-                (ray.t, ray.x, ray.y) = (middle, x, y);
-            }
+            let under = there.below(cells, middle);
+            below = L::select(halving & under, middle, below);
+            *rays = rays.or(halving & !under, &there);
         }
-        below
+        rays.closed_until = L::select(chosen, below, rays.closed_until);
     }
 }

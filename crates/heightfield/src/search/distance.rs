@@ -9,8 +9,11 @@
 use glam::Vec3;
 
 use super::Search;
-use super::cell_walk::{CellWalk, NOTHING, Patch};
-use crate::{DistanceMap, Found, HeightField};
+use super::cell_walk::{CellWalk, Cells, Leap, Patch, Stand, trace};
+use crate::chunk::Chunk;
+use crate::lanes::Lanes;
+use crate::wide::leaps;
+use crate::{DistanceMap, Found, HeightField, Wrap};
 
 technique! {
     /// Parameters of [`search`](Search::trace) as described above.
@@ -23,42 +26,82 @@ technique! {
 /// What rounding of the position costs a step, as a share of the way that the ray came, and of the step.
 const DRIFT: f32 = 8.0 * f32::EPSILON;
 
-/// The least distance from a point at height `z` over a cell to the surface.
+/// The texels whose footprints the points are in, along one axis: a footprint ends half-way to the next.
 #[inline(always)]
-fn distance(field: &HeightField, map: &DistanceMap, patch: &Patch, z: f32) -> f32 {
+fn nearest<L: Lanes>(field: &HeightField, id: L::I, local: L::F, texels: usize) -> L::I {
+    let (zero, one) = (L::splat_int(0), L::splat_int(1));
+    let last = L::splat_int(texels as i32 - 1);
+    let at = id + L::select_int(L::le(L::splat(0.5), local), one, zero);
+    match field.wrap() {
+        Wrap::Repeat => L::select_int(L::lt_int(last, at), zero, at),
+        // The cells begin one texel before the first.
+        Wrap::Clamp => L::min_int(L::select_int(L::lt_int(at, one), zero, at - one), last),
+        Wrap::Mirror => {
+            let back = last + one + last - at;
+            L::select_int(L::lt_int(back, zero), zero, L::min_int(at, back))
+        }
+    }
+}
+
+/// Lower bounds of the distance from points at heights `z` to the surface.
+#[inline(always)]
+fn distance<L: Lanes>(map: &DistanceMap, cells: &Cells<'_, L>, patch: &Patch<L>, z: L::F) -> L::F {
     let [w, h, depth] = map.size();
-    // The footprint of a texel ends half-way to the next.
-    let texel = |axis: usize, n: usize| {
-        let nearest = patch.id[axis] as i64 + field.first_texel() + i64::from(patch.local[axis] >= 0.5);
-        field.wrap().index(nearest, n)
-    };
-    let slice = ((z * depth as f32) as usize).min(depth - 1);
-    map.distance(texel(0, w), texel(1, h), slice)
+    let column = nearest::<L>(cells.field, patch.id[0], patch.local[0], w);
+    let row = nearest::<L>(cells.field, patch.id[1], patch.local[1], h);
+    let z = L::max(z * L::splat(depth as f32), L::splat(0.0));
+    let slice = L::to_int(L::min(z, L::splat((depth - 1) as f32)));
+    let mut at = [[0; 16]; 3];
+    for (at, id) in at.iter_mut().zip([column, row, slice]) {
+        L::store_int(id, at);
+    }
+    // Codes of 16 bits, of which there may be more than an `i32` can number.
+    let mut found = [0.0; 16];
+    for (lane, found) in found[..L::WIDTH].iter_mut().enumerate() {
+        let [i, j, k] = at.map(|ids| ids[lane].max(0) as usize);
+        *found = map.distance(i.min(w - 1), j.min(h - 1), k.min(depth - 1));
+    }
+    L::load(&found)
+}
+
+impl Leap for Distance {
+    type Maps<'a> = &'a DistanceMap;
+
+    #[inline(always)]
+    fn maps<'a>(&self, field: &'a HeightField) -> Option<&'a DistanceMap> {
+        field.distance_map()
+    }
+
+    #[inline(always)]
+    fn most_steps(&self) -> u32 {
+        self.steps
+    }
+
+    /// 1 / speed, in mesh units.
+    #[inline(always)]
+    fn pace<L: Lanes>(map: &DistanceMap, delta: [L::F; 3]) -> L::F {
+        let metric = map.metric();
+        let [x, y, z] =
+            [delta[0] * L::splat(metric.x), delta[1] * L::splat(metric.y), delta[2] * L::splat(metric.z)];
+        // A standing ray is taken to be slow enough for any distance to be a whole step.
+        L::splat(1.0) / L::max(L::sqrt(x * x + y * y + z * z), L::splat(1e-30))
+    }
+
+    #[inline(always)]
+    fn leap<L: Lanes>(map: &DistanceMap, rays: &CellWalk<L>, cells: &Cells<'_, L>, at: &Stand<L>) -> L::F {
+        let free = distance(map, cells, &at.patch, rays.z(rays.t)) * rays.pace;
+        rays.t + (free * L::splat(1.0 - DRIFT) - rays.t * L::splat(DRIFT))
+    }
 }
 
 impl Search for Distance {
     #[inline(always)]
     fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, _: f32, from_surface: bool) -> Found {
-        let Some(map) = field.distance_map() else { return NOTHING };
-        let Some(mut ray) = CellWalk::new(field, start, delta, from_surface) else { return NOTHING };
-        // A standing ray is taken to be slow enough for any distance to be a whole step.
-        let inverse_speed = (delta * map.metric()).length().max(1e-30).recip();
-        for steps in 1..=self.steps {
-            let stand = ray.stand(field);
-            if stand.gap <= 0.0 && !stand.on_surface {
-                return Found::hit(ray.t, steps);
-            }
-            let free = distance(field, map, &stand.patch, ray.z(ray.t)) * inverse_speed;
-            let jump = ray.t + (free * (1.0 - DRIFT) - ray.t * DRIFT);
-            if jump > stand.exit() {
-                ray.jump(jump);
-            } else if let Some(t) = ray.cross(&stand) {
-                return Found::hit(t, steps);
-            }
-            if ray.has_left() {
-                return Found::left(steps);
-            }
-        }
-        ray.unconverged(self.steps)
+        trace(self, field, start, delta, from_surface)
+    }
+
+    #[inline(always)]
+    fn march(&self, field: &HeightField, chunk: &mut Chunk<'_>) {
+        leaps::march(self, self, field, chunk);
     }
 }

@@ -4,7 +4,6 @@
 use glam::Vec3;
 
 use crate::chunk::Chunk;
-use crate::march::march_by_segments;
 use crate::technique::TechniqueInfo;
 use crate::{Found, HeightField, Status};
 
@@ -39,10 +38,7 @@ pub trait Search: Sized {
     }
 
     /// Runs the search over many rays.
-    #[inline(always)]
-    fn march(&self, field: &HeightField, chunk: &mut Chunk<'_>) {
-        march_by_segments(self, field, chunk);
-    }
+    fn march(&self, field: &HeightField, chunk: &mut Chunk<'_>);
 }
 
 /// Declares a technique: its parameter struct and its [`TechniqueInfo`].

@@ -9,7 +9,10 @@
 use glam::Vec3;
 
 use super::Search;
+use super::cell_walk::trace;
 use super::cone_walk::ConeWalk;
+use crate::chunk::Chunk;
+use crate::wide::leaps;
 use crate::{ConeKind, Found, HeightField};
 
 technique! {
@@ -20,15 +23,27 @@ technique! {
     parameters { steps: 16384 in 1..=65536, "Most steps; a ray that needs more is unconverged."; refine: 12 in 0..=32, "Halvings of a jump that ends below the surface, before it is followed cell by cell."; }
 }
 
-impl Search for RelaxedCone {
+impl RelaxedCone {
+    /// What it walks by.
     #[inline(always)]
-    fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, _: f32, from_surface: bool) -> Found {
-        let walk = ConeWalk {
+    pub(crate) fn walk(&self) -> ConeWalk<false> {
+        ConeWalk {
             empty: ConeKind::Cone,
             relaxed: Some(ConeKind::RelaxedCone),
             refine: self.refine,
             most_steps: self.steps,
-        };
-        walk.trace::<false>(field, start, delta, from_surface)
+        }
+    }
+}
+
+impl Search for RelaxedCone {
+    #[inline(always)]
+    fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, _: f32, from_surface: bool) -> Found {
+        trace(&self.walk(), field, start, delta, from_surface)
+    }
+
+    #[inline(always)]
+    fn march(&self, field: &HeightField, chunk: &mut Chunk<'_>) {
+        leaps::march(&self.walk(), self, field, chunk);
     }
 }

@@ -39,6 +39,7 @@ impl<S: WideSearch> Kernel for March<'_, '_, S> {
             let found = search.search(&heights, &clipped.segments);
             let outcome = Outcome::<L> {
                 hit: found.hit & clipped.meets,
+                unconverged: L::first(0),
                 t: clipped.t_start + L::widen(found.tau) * clipped.t_length,
                 steps: L::select_int(clipped.meets, found.steps, L::splat_int(0)),
             };
@@ -52,19 +53,20 @@ impl<S: WideSearch> Kernel for March<'_, '_, S> {
     }
 }
 
-struct Clipped<L: Lanes> {
-    segments: Segments<L>,
-    t_start: L::D,
-    t_length: L::D,
+/// The part of each ray between the lid or its origin and the floor or the lid.
+pub(super) struct Clipped<L: Lanes> {
+    pub segments: Segments<L>,
+    pub t_start: L::D,
+    pub t_length: L::D,
     /// Rays that come into the relief.
-    meets: L::M,
+    pub meets: L::M,
     /// Rays with no end in the slab, for which the rest is of no use.
-    level: L::M,
+    pub level: L::M,
 }
 
 /// As [`crate::Segment::clip`].
 #[inline(always)]
-fn clip<L: Lanes>(field: &HeightField, origin: [L::D; 3], direction: [L::D; 3]) -> Clipped<L> {
+pub(super) fn clip<L: Lanes>(field: &HeightField, origin: [L::D; 3], direction: [L::D; 3]) -> Clipped<L> {
     let (zero, one) = (L::splat_wide(0.0), L::splat_wide(1.0));
     let [du, dv, dz] = direction;
     let oz = origin[2];

@@ -4,6 +4,7 @@
 //! ray, which the device's is compared with, is the same code with one lane, and so gives the same bits.
 
 mod heights;
+pub(crate) mod leaps;
 mod march;
 
 use glam::Vec3;
