@@ -1,10 +1,10 @@
 //! Displacement: a mesh cut into micro-polygons that are moved along its normals by a height.
 //!
 //! `P* = P + scale (h - base) N` with `P`, the UVs and the normal interpolated over each triangle and the
-//! normal made unit. Where vertices share a position, or triangles an edge, all of them are displaced to one
-//! place: by the mean of their heights along the mean of their normals. So UV seams, mirrored charts and hard
-//! edges leave no gap; at hard edges and where the heights of two charts differ, the outermost ring of
-//! micro-triangles bridges the difference.
+//! normal made unit. Where vertices share a position, or triangles an edge, but differ in UVs or normals, strips
+//! run from where each of them is displaced to the place where they meet: by the mean of their heights along the
+//! mean of their normals. So UV seams, mirrored charts and hard edges leave no gap, and what closes them does not
+//! depend on how finely the mesh is cut.
 //!
 //! Sources: Cook, "Shade Trees", SIGGRAPH 1984; Cook, Carpenter and Catmull, "The Reyes Image Rendering
 //! Architecture", SIGGRAPH 1987 (micro-polygons below a pixel); Moule and McCool, "Efficient Bounded Adaptive
@@ -49,7 +49,7 @@ pub struct EdgeSide {
 /// Micro-polygons. Vertices carry what the undisplaced mesh has there, and where they were moved to.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Displaced {
-    /// Displaced positions, mesh units. Equal where vertices were at one position of the mesh.
+    /// Displaced positions, mesh units. Equal where micro-triangles meet.
     pub positions: Vec<Vec3>,
     /// The triangle of the mesh that a vertex belongs to.
     pub faces: Vec<u32>,
@@ -95,9 +95,10 @@ pub fn displace(mesh: &Mesh, cut: &Cut<'_>, relief: &Relief<'_>) -> Result<Displ
     let pieces = seams.pieces(mesh, cut.segments);
     let faces: Vec<u32> = range.clone().into_par_iter().filter(|&face| (cut.keep)(face)).collect();
     let of = |face: u32| seams.pieces_of((face - range.start) as usize, &pieces);
+    let of_strips = |edge: usize| 2 * seams.sides(edge).len() as u64 * u64::from(pieces[edge]);
     let total: u64 = faces.iter().map(|&face| pattern::size(of(face)).0).sum();
-    cut.check(total)?;
-    let rim = seams.displace(mesh, cut, &pieces, relief);
+    cut.check(total + seams.parted().map(of_strips).sum::<u64>())?;
+    let rim = seams.displace(mesh, cut.origin, &pieces, relief);
     let micro = |&face: &u32| {
         let pattern = pattern::pattern(of(face));
         let triangle = mesh.indices[face as usize];
@@ -119,6 +120,12 @@ pub fn displace(mesh: &Mesh, cut: &Cut<'_>, relief: &Relief<'_>) -> Result<Displ
             displaced.weights.extend(pattern.points.iter().map(|b| DVec2::new(b[1], b[2]).as_vec2()));
             displaced.indices.extend(pattern.triangles.iter().map(|t| t.map(|vertex| vertex + first)));
         }
+    }
+    let meetings = seams.meetings(mesh, range, cut.origin, relief);
+    for edge in seams.parted() {
+        let shares: Vec<f64> =
+            (0..=pieces[edge]).map(|k| f64::from(k) / f64::from(pieces[edge])).collect();
+        displaced.bridge(&seams, mesh, edge, &shares, &meetings, cut.origin, relief, cut.keep);
     }
     Ok(displaced)
 }

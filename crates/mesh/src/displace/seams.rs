@@ -5,8 +5,9 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use glam::{DVec2, DVec3, Vec3};
+use rayon::prelude::*;
 
-use super::{Cut, EdgeSide, Relief};
+use super::{EdgeSide, Relief};
 use crate::Mesh;
 use crate::frame::weld::first_equal;
 
@@ -14,10 +15,20 @@ use crate::frame::weld::first_equal;
 pub(super) struct Seams {
     /// For each vertex the first one at the same position.
     welded: Vec<u32>,
-    /// For each triangle of the range its edges, and whether it runs along them backwards.
-    edges_of: Vec<[(u32, bool); 3]>,
+    /// For each triangle of the range how it sees its edges.
+    edges_of: Vec<[EdgeUse; 3]>,
     /// For each edge its different sides.
     sides: Vec<Vec<Side>>,
+}
+
+/// How a triangle sees one of its edges.
+#[derive(Debug, Clone, Copy)]
+struct EdgeUse {
+    edge: u32,
+    /// Which of its sides.
+    side: u32,
+    /// Whether it runs along it backwards.
+    backwards: bool,
 }
 
 /// One of the different ways in which the triangles along an edge see it.
@@ -33,14 +44,25 @@ pub(super) struct Side {
     pub backwards: bool,
 }
 
-/// Where the points of edges and corners are displaced to.
+/// Where the rims of triangles are displaced to, each side of an edge for itself.
 pub(super) struct Rim {
-    /// For each vertex of the mesh; those that no triangle uses stay.
+    /// For each vertex of the mesh.
     corners: Vec<Vec3>,
-    /// The points inside edges, one edge after the other.
+    /// The points inside edges, one edge after the other, one side after the other.
     points: Vec<Vec3>,
     /// Where each edge's points begin.
     first: Vec<usize>,
+}
+
+/// A strip from where one side of an edge is displaced to where all of them meet.
+pub(super) struct Strip<'a> {
+    pub side: &'a Side,
+    /// Shares of the edge, from 0 to 1.
+    pub shares: &'a [f64],
+    /// At each share where the side is displaced to.
+    pub own: Vec<Vec3>,
+    /// And where the sides meet.
+    pub meeting: Vec<Vec3>,
 }
 
 impl Seams {
@@ -66,10 +88,11 @@ impl Seams {
                     sides.len() as u32 - 1
                 });
                 let known = &mut sides[number as usize];
-                if !known.iter().any(|side| same_side(mesh, side.ends, ends)) {
+                let side = known.iter().position(|side| same_side(mesh, side.ends, ends)).unwrap_or_else(|| {
                     known.push(Side { ends, face, corner, backwards });
-                }
-                (number, backwards)
+                    known.len() - 1
+                });
+                EdgeUse { edge: number, side: side as u32, backwards }
             }));
         }
         Self { welded, edges_of, sides }
@@ -83,12 +106,44 @@ impl Seams {
 
     /// Pieces of the edges of a triangle, counted within the range.
     pub fn pieces_of(&self, face: usize, pieces: &[u32]) -> [u32; 3] {
-        self.edges_of[face].map(|(edge, _)| pieces[edge as usize])
+        self.edges_of[face].map(|seen| pieces[seen.edge as usize])
     }
 
-    /// Displaces corners and edges. At each place the heights of all sides are averaged, and their normals.
-    pub fn displace(&self, mesh: &Mesh, cut: &Cut<'_>, pieces: &[u32], relief: &Relief<'_>) -> Rim {
-        let range = cut.range;
+    /// Displaces corners and edges, each side for itself.
+    pub fn displace(&self, mesh: &Mesh, origin: DVec3, pieces: &[u32], relief: &Relief<'_>) -> Rim {
+        let corners =
+            (0..mesh.positions.len()).into_par_iter().map(|at| relief.corner(mesh, at, origin)).collect();
+        let mut first = Vec::with_capacity(self.sides.len());
+        let mut points = Vec::new();
+        for (sides, &pieces) in self.sides.iter().zip(pieces) {
+            first.push(points.len());
+            for side in sides {
+                let share = |k: u32| f64::from(k) / f64::from(pieces);
+                points.extend((1..pieces).map(|k| relief.along(mesh, &[*side], share(k), origin)));
+            }
+        }
+        Rim { corners, points, first }
+    }
+
+    /// The edges whose sides differ, by their numbers.
+    pub fn parted(&self) -> impl Iterator<Item = usize> + '_ {
+        self.sides.iter().enumerate().filter(|(_, sides)| sides.len() > 1).map(|(edge, _)| edge)
+    }
+
+    /// The sides of an edge.
+    pub fn sides(&self, edge: usize) -> &[Side] {
+        &self.sides[edge]
+    }
+
+    /// For each place of the range that several vertices share where they meet: by the mean of their heights along
+    /// the mean of their normals. By the first of the vertices there.
+    pub fn meetings(
+        &self,
+        mesh: &Mesh,
+        range: &Range<u32>,
+        origin: DVec3,
+        relief: &Relief<'_>,
+    ) -> HashMap<u32, Vec3> {
         let mut around: HashMap<u32, Vec<u32>> = HashMap::new();
         for &vertex in mesh.indices[range.start as usize..range.end as usize].iter().flatten() {
             let vertices = around.entry(self.welded[vertex as usize]).or_default();
@@ -96,50 +151,48 @@ impl Seams {
                 vertices.push(vertex);
             }
         }
-        let mut corners: Vec<Vec3> =
-            mesh.positions.iter().map(|p| (p.as_dvec3() - cut.origin).as_vec3()).collect();
-        for (vertex, corner) in corners.iter_mut().enumerate() {
-            let Some(vertices) = around.get(&self.welded[vertex]) else { continue };
+        let meeting = |(place, vertices): (u32, Vec<u32>)| {
             let sides = vertices.iter().map(|&at| {
                 let at = at as usize;
                 (mesh.uvs[at].as_dvec2(), mesh.normals[at].as_dvec3())
             });
-            *corner = (relief.shared(mesh.positions[vertex].as_dvec3(), sides) - cut.origin).as_vec3();
-        }
-        let mut first = Vec::with_capacity(self.sides.len());
-        let mut points = Vec::new();
-        for (sides, &pieces) in self.sides.iter().zip(pieces) {
-            first.push(points.len());
-            let [a, b] = sides[0].ends.map(|end| mesh.positions[end as usize].as_dvec3());
-            for k in 1..pieces {
-                let share = f64::from(k) / f64::from(pieces);
-                let seen = sides.iter().map(|side| side.at(mesh, share));
-                points.push((relief.shared(a.lerp(b, share), seen) - cut.origin).as_vec3());
-            }
-        }
-        Rim { corners, points, first }
+            let position = mesh.positions[place as usize].as_dvec3();
+            (place, (relief.shared(position, sides) - origin).as_vec3())
+        };
+        around.into_iter().map(meeting).collect()
     }
 
-    /// Micro-triangles of the strips along edges whose sides differ.
-    pub fn pieces_of_strips(&self, pieces: &[u32]) -> u64 {
-        let parted = self.sides.iter().zip(pieces).filter(|(sides, _)| sides.len() > 1);
-        parted.map(|(sides, &pieces)| 2 * sides.len() as u64 * u64::from(pieces)).sum()
-    }
-
-    /// The edges whose sides differ, with the number of their pieces, and where they are displaced to from
-    /// the first end to the last.
-    pub fn parted<'a>(
+    /// The strips along one edge, cut at `shares`.
+    pub fn strips<'a>(
         &'a self,
-        pieces: &'a [u32],
-        rim: &'a Rim,
-    ) -> impl Iterator<Item = (&'a [Side], Vec<Vec3>)> + 'a {
-        self.sides.iter().enumerate().filter(|(_, sides)| sides.len() > 1).map(|(edge, sides)| {
-            let [a, b] = sides[0].ends.map(|end| rim.corners[end as usize]);
-            let first = rim.first[edge];
-            let inside = &rim.points[first..first + pieces[edge] as usize - 1];
-            let line = std::iter::once(a).chain(inside.iter().copied()).chain(std::iter::once(b)).collect();
-            (sides.as_slice(), line)
-        })
+        mesh: &Mesh,
+        edge: usize,
+        shares: &'a [f64],
+        meetings: &HashMap<u32, Vec3>,
+        origin: DVec3,
+        relief: &Relief<'_>,
+    ) -> impl Iterator<Item = Strip<'a>> {
+        let sides = &self.sides[edge];
+        let last = shares.len() - 1;
+        let line = |side: Option<&Side>| -> Vec<Vec3> {
+            let point = |(k, &share): (usize, &f64)| {
+                // The ends are where whole vertices go, to the last bit.
+                let end = side.unwrap_or(&sides[0]).ends[usize::from(k == last)];
+                match (k == 0 || k == last, side) {
+                    (true, Some(_)) => relief.corner(mesh, end as usize, origin),
+                    (true, None) => meetings.get(&self.welded[end as usize]).copied().unwrap_or_default(),
+                    (false, Some(side)) => relief.along(mesh, &[*side], share, origin),
+                    (false, None) => relief.along(mesh, sides, share, origin),
+                }
+            };
+            shares.iter().enumerate().map(point).collect()
+        };
+        let meeting = line(None);
+        let strips: Vec<_> = sides
+            .iter()
+            .map(|side| Strip { side, shares, own: line(Some(side)), meeting: meeting.clone() })
+            .collect();
+        strips.into_iter()
     }
 
     /// Where the points on the rim of a triangle's pattern are: corners, then the points inside its edges.
@@ -150,11 +203,12 @@ impl Seams {
         pieces: &'a [u32],
         rim: &'a Rim,
     ) -> impl Iterator<Item = Vec3> + 'a {
-        let inside = self.edges_of[face].into_iter().flat_map(move |(edge, backwards)| {
-            let edge = edge as usize;
+        let inside = self.edges_of[face].into_iter().flat_map(move |seen| {
+            let edge = seen.edge as usize;
             let count = pieces[edge] as usize - 1;
-            let run = &rim.points[rim.first[edge]..rim.first[edge] + count];
-            (0..count).map(move |k| run[if backwards { count - 1 - k } else { k }])
+            let first = rim.first[edge] + seen.side as usize * count;
+            let run = &rim.points[first..first + count];
+            (0..count).map(move |k| run[if seen.backwards { count - 1 - k } else { k }])
         });
         triangle.into_iter().map(|corner| rim.corners[corner as usize]).chain(inside)
     }
@@ -179,13 +233,26 @@ impl Side {
 }
 
 impl EdgeSide {
-    fn of(mesh: &Mesh, ends: [u32; 2]) -> Self {
+    pub(super) fn of(mesh: &Mesh, ends: [u32; 2]) -> Self {
         let ends = ends.map(|end| end as usize);
         Self { positions: ends.map(|end| mesh.positions[end]), uvs: ends.map(|end| mesh.uvs[end]) }
     }
 }
 
 impl Relief<'_> {
+    /// Where a vertex is displaced to.
+    fn corner(&self, mesh: &Mesh, vertex: usize, origin: DVec3) -> Vec3 {
+        let side = (mesh.uvs[vertex].as_dvec2(), mesh.normals[vertex].as_dvec3());
+        (self.shared(mesh.positions[vertex].as_dvec3(), std::iter::once(side)) - origin).as_vec3()
+    }
+
+    /// Where the sides of an edge meet at a share of it.
+    fn along(&self, mesh: &Mesh, sides: &[Side], share: f64, origin: DVec3) -> Vec3 {
+        let [a, b] = sides[0].ends.map(|end| mesh.positions[end as usize].as_dvec3());
+        let seen = sides.iter().map(|side| side.at(mesh, share));
+        (self.shared(a.lerp(b, share), seen) - origin).as_vec3()
+    }
+
     /// The one place of a point that several sides share.
     pub(super) fn shared(&self, position: DVec3, sides: impl Iterator<Item = (DVec2, DVec3)>) -> DVec3 {
         let (mut height, mut normal, mut count) = (0.0, DVec3::ZERO, 0.0);
