@@ -142,6 +142,8 @@ class Renderer:
         shadows: bool | None,
         horizon: tuple[int, float] | None,
         silhouettes: bool,
+        samples: int,
+        specular_aa: bool,
         aovs: Sequence[str],
         skips: Sequence[str],
     ) -> Renderer: ...

@@ -45,6 +45,10 @@ class Renderer:
         Whether the relief shadows itself.
     silhouettes : bool, default False
         True outlines, with ``technique="exact"``.
+    samples : {1, 4, 16}, default 1
+        Samples a pixel.
+    specular_aa : bool, default True
+        Whether highlights widen where a pixel holds many slopes.
     aovs : str or iterable of str
         Additional outputs.
     skip : bool or iterable of str, default True
@@ -82,6 +86,8 @@ class Renderer:
         size: int | tuple[int, int] = (512, 512),
         shadows: bool | Literal["horizon"] | HorizonShadows | None = None,
         silhouettes: bool = False,
+        samples: int = 1,
+        specular_aa: bool = True,
         aovs: str | Iterable[str] = (),
         skip: bool | str | Iterable[str] = True,
         device: str = "auto",
@@ -97,6 +103,8 @@ class Renderer:
             size=size,
             shadows=shadows,
             silhouettes=silhouettes,
+            samples=samples,
+            specular_aa=specular_aa,
             aovs=aovs,
             skip=skip,
             device=device,

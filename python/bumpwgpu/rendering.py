@@ -211,6 +211,8 @@ def render(
     size: int | tuple[int, int] = (512, 512),
     shadows: bool | Literal["horizon"] | HorizonShadows | None = None,
     silhouettes: bool = False,
+    samples: int = 1,
+    specular_aa: bool = True,
     aovs: str | Iterable[str] = (),
     skip: bool | str | Iterable[str] = True,
     device: str = "auto",
@@ -236,13 +238,21 @@ def render(
         Pixels: the side of a square, or (width, height).
     shadows : bool, "horizon", HorizonShadows or None
         Whether the relief shadows itself, by the technique's own search towards each light. None:
-        where the technique can. "horizon" looks shadows up in a baked horizon map instead, also for
+        where the technique can. With ``silhouettes`` and ``technique="displacement"`` everything in the scene
+        also shadows everything else. "horizon" looks shadows up in a baked horizon map instead, also for
         "bump" and "normal", which cast none; :class:`HorizonShadows` chooses its size and softness.
     silhouettes : bool, default False
         Trace rays through the shell around the mesh in which the relief lies, instead of bending the
         texture on its surface: outlines, depth, intersections and shadows are then those of
         ``technique="displacement"``, also on curved meshes, across seams and with the camera inside the
         shell. For ``technique="exact"``; on the others it has no effect, and a warning says so.
+    samples : {1, 4, 16}, default 1
+        Samples a pixel, in a square grid: each is searched and shaded for itself, so that edges inside a relief
+        are smooth too, and they are averaged in linear light. The ``aovs`` are those of one sample in the
+        middle of each pixel; counts in ``stats`` are of all samples.
+    specular_aa : bool, default True
+        Where a pixel holds many slopes of the relief, highlights are as wide as those spread them
+        (Toksvig 2005), so that they neither vanish nor flicker. Close up it changes nothing.
     aovs : str or iterable of str
         Additional outputs, (H, W) or (H, W, C): "uv" (unwrapped), "depth" (along the view axis, mesh
         units, inf where nothing is), "position" (float32 as the others: half a
@@ -296,6 +306,8 @@ def render(
         size=size,
         shadows=shadows,
         silhouettes=silhouettes,
+        samples=samples,
+        specular_aa=specular_aa,
         aovs=aovs,
         skip=skip,
         device=device,
@@ -318,6 +330,8 @@ def prepared(
     size: Any,
     shadows: Any,
     silhouettes: Any,
+    samples: Any,
+    specular_aa: Any,
     aovs: Any,
     skip: Any,
     device: Any,
@@ -351,6 +365,8 @@ def prepared(
         (width, height),
         *_shadows(shadows),
         flag("silhouettes", silhouettes),
+        _samples(samples),
+        flag("specular_aa", specular_aa),
         outputs,
         _skips(skip),
     )
@@ -371,6 +387,12 @@ def camera_values(camera: Any) -> _bumpwgpu._Camera:
 def frame_of(result: _bumpwgpu._RenderResult, texts: list[str]) -> Frame:
     """A frame from what the core returns, with further warnings."""
     return Frame(result["color"], result["aovs"], result["stats"], (*result["warnings"], *texts))
+
+
+def _samples(samples: Any) -> int:
+    if isinstance(samples, bool) or samples not in (1, 4, 16):
+        raise ValueError(f"samples must be 1, 4 or 16, got {samples!r}")
+    return int(samples)
 
 
 def _shadows(shadows: Any) -> tuple[bool | None, tuple[int, float] | None]:

@@ -4,6 +4,9 @@
 #import "shading/shade.wgsl"
 #import "shading/shadow_shell.wgsl"
 
+// In the number of a triangle: that what is drawn is a strip along one of its edges.
+const ON_STRIP: u32 = 0x80000000u;
+
 struct VertexIn {
     @location(0) position: vec3f,
     @location(8) face: u32,
@@ -25,12 +28,19 @@ fn vertex(in: VertexIn) -> Varyings {
 
 @fragment
 fn fragment(in: Varyings, @builtin(front_facing) front: bool) -> Targets {
-    var point = facing(gathered(in.face, in.weights), front);
+    enter_solid(draw.own.y);
+    let face = in.face & ~ON_STRIP;
+    var point = facing(gathered(face, in.weights), front);
     point = with_footprint(point, in.position);
     point.height = surface_height(point.uv);
     let albedo = albedo_at(point.uv, point.uv_dx, point.uv_dy);
-    let on_surface = displaced_position(in.face, in.weights, point.height);
-    let shadow = ShadowPoint(point.surface, vec3f(point.uv, point.height), on_surface);
+    var start = ShellStart(face, select(PRISM, PLAIN, material.scale == 0.0), in.weights, point.height);
+    var on_surface = displaced_position(face, in.weights, point.height);
+    if face != in.face {
+        start.strip = ANY_STRIP;
+        on_surface = in.position;
+    }
+    let shadow = ShadowPoint(point.surface, vec3f(point.uv, point.height), on_surface, start);
     var shaded = shade_mesh(in.position, shading_normal(point), point.uv, albedo, shadow);
     shaded.place.w = point.height;
     return targets(shaded);

@@ -1,4 +1,4 @@
-// Relief traced through the shell around the mesh, outline, depth and shadows included: search/exact,
+// Relief and meshes without any, traced through the shell around the mesh, outline, depth and shadows included: search/exact,
 // surface/displaced, surface/tangent. Drawn for the far sides of a box around the shell, so that the camera may
 // stand inside.
 #import "shading/gather.wgsl"
@@ -21,7 +21,8 @@ fn fragment(in: Varyings) -> ReliefTargets {
     let away = frame.corner.xyz + in.clip.x * frame.pixel_right.xyz + in.clip.y * frame.pixel_down.xyz;
     let direction = (draw.object_from_relative * vec4f(away, 0.0)).xyz;
     let stretch = length(direction);
-    let hit = trace_shell(shell_ray(draw.eye.xyz, direction, frame.forward.w * stretch, false), direction, 1e30);
+    enter_solid(draw.own.y);
+    let hit = trace_solid(shell_ray(draw.eye.xyz, direction, frame.forward.w * stretch), 1e30);
     if !hit.found {
         discard;
     }
@@ -35,8 +36,12 @@ fn fragment(in: Varyings) -> ReliefTargets {
     let normal = world_normal(shading_normal(point));
     let albedo = albedo_at(point.uv, point.uv_dx, point.uv_dy);
     let place = vec3f(point.uv, point.height);
-    let on_surface = displaced_position(hit.face, hit.weights, point.height);
-    let light = lit(albedo.rgb, relative, normal, ShadowPoint(point.surface, place, on_surface));
+    var on_surface = position;
+    if hit.strip == PRISM {
+        on_surface = displaced_position(hit.face, hit.weights, point.height);
+    }
+    let start = ShellStart(hit.face, hit.strip, hit.weights, point.height);
+    let light = lit(albedo.rgb, relative, normal, ShadowPoint(point.surface, place, on_surface, start));
 
     var out: ReliefTargets;
     out.color = displayable(light.color);

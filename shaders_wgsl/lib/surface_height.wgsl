@@ -6,6 +6,6 @@ fn surface_height(uv: vec2f) -> f32 {
     let p = uv * height_info.size - 0.5;
     let cell = floor(p);
     let f = p - cell;
-    let corners = textureGather(0, height_texture, height_sampler, (cell + 1.0) / height_info.size).wzxy;
+    let corners = corners_of(cell);
     return mix(mix(corners.x, corners.y, f.x), mix(corners.z, corners.w, f.x), f.y);
 }

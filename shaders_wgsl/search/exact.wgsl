@@ -24,17 +24,12 @@ const ON_SURFACE: f32 = 1e-3;
 // Adding 1.5 * 2^23 leaves a whole number below 2^22 in the low bits.
 const TO_BITS: f32 = 12582912.0;
 
-// Corner heights of the cell whose lower corner is texel `cell`: h00, h10, h01, h11.
-fn corners_of(cell: vec2f) -> vec4f {
-    return textureGather(0, height_texture, height_sampler, (cell + 1.0) / height_info.size).wzxy;
-}
-
 // The highest point of the surface around a node, of 2^bits along x and y. raw: its ids in the low bits.
 fn maximum_of(raw: vec2i, bits: vec2i, offset_bits: i32) -> f32 {
     let last = (vec2i(1) << vec2u(bits)) - 1;
     let id = raw & last;
     let offset = offset_bits & ((1 << u32(bits.x + bits.y)) - 1);
-    return pyramid[offset + (id.y << u32(bits.x)) + id.x];
+    return maximum_at(offset + (id.y << u32(bits.x)) + id.x);
 }
 
 // bounded: whether the segment ends at its end; otherwise it goes on to the surface below.

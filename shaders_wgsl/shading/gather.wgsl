@@ -1,15 +1,15 @@
 // What a mesh has at a point inside one of its triangles.
 #import "bindings/draw.wgsl"
 #import "bindings/frame.wgsl"
-#import "bindings/triangles.wgsl"
+#import "bindings/solids.wgsl"
 #import "lib/footprint.wgsl"
 #import "lib/surface_point.wgsl"
 
 // weights: of the triangle's second and third corner.
 fn gathered(face: u32, weights: vec2f) -> SurfacePoint {
-    let a = vertices[triangles[3u * face]];
-    let b = vertices[triangles[3u * face + 1u]];
-    let c = vertices[triangles[3u * face + 2u]];
+    let a = corner_of(face, 0u);
+    let b = corner_of(face, 1u);
+    let c = corner_of(face, 2u);
     let w = vec3f(1.0 - weights.x - weights.y, weights);
     var point: SurfacePoint;
     point.surface.normal = w.x * a.up.xyz + w.y * b.up.xyz + w.z * c.up.xyz;

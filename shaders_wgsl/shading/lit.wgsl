@@ -3,6 +3,7 @@
 #import "bindings/frame.wgsl"
 #import "bindings/material.wgsl"
 #import "lib/blinn_phong.wgsl"
+#import "lib/gloss.wgsl"
 #import "lib/normalize.wgsl"
 #import "shading/branches.wgsl"
 
@@ -17,6 +18,7 @@ fn lit(albedo: vec3f, position: vec3f, normal: vec3f, point: ShadowPoint) -> Lit
     let to_eye = normalize_or(-position, normal);
     var result: Lit;
     result.color = albedo * frame.ambient.rgb;
+    let gloss = spread_gloss(material.specular, material.shininess);
     var facing = 0u;
     var blocked = 0.0;
     let count = light_count();
@@ -42,7 +44,7 @@ fn lit(albedo: vec3f, position: vec3f, normal: vec3f, point: ShadowPoint) -> Lit
         let falloff = select(1.0 / max(dot(offset, offset), 1e-12), 1.0, distant);
         result.color += (1.0 - share_hidden) * blinn_phong(
             normal, to_light, to_eye, albedo, light.color.rgb * falloff,
-            material.specular, material.shininess);
+            gloss.x, gloss.y);
     }
     result.blocked = blocked / f32(max(facing, 1u));
     return result;

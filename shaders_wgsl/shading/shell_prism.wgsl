@@ -3,60 +3,34 @@
 //
 // The curve is followed by chords that stay within SAG of it; each is searched exactly. On flat triangles with
 // one normal it is one chord, and nothing is approximated.
-#import "bindings/material.wgsl"
-#import "bindings/shell.wgsl"
-#import "bindings/triangles.wgsl"
+#import "bindings/solids.wgsl"
 #import "lib/emerge.wgsl"
 #import "lib/prism.wgsl"
 #import "search/exact.wgsl"
-#import "shading/branches.wgsl"
+#import "shading/shell_ray.wgsl"
+#import "shading/shell_sides.wgsl"
 
 // How far a chord may be from the curve, in texels and in heights.
 const SAG: vec2f = vec2f(0.02, 5e-4);
 const MAX_CHORDS: f32 = 48.0;
+// Light rays meet nothing on their first so many cells, unless they are below the surface at the end of them. Creases
+// between cells are no part of what the texels stand for, and the shading, whose slopes are smooth, knows none.
+const CREASE: f32 = 1.0;
 // Deeper than this below the surface, a ray has not met it by rounding: it is on the other side.
 const ROUNDED_BELOW: f32 = 2e-3;
-
-// Whether surfaces seen from inside are seen.
-override sees_inside: bool = false;
-
-struct ShellHit {
-    found: bool,
-    inside: bool,          // whether the surface was met from inside
-    status: u32,           // 0 hit, 1 left, 2 unconverged
-    steps: u32,
-    t: f32,
-    face: u32,
-    weights: vec2f,        // of the second and third corner
-}
-
-struct ShellRay {
-    origin: vec3f,
-    across: mat3x3f,       // to the ray's own axes: the third runs along it
-    first: f32,            // where it begins
-    for_shadow: bool,      // starts on the surface; anything hit will do
-}
-
-fn shell_ray(origin: vec3f, direction: vec3f, first: f32, for_shadow: bool) -> ShellRay {
-    let z = normalize_or(direction, vec3f(0.0, 0.0, 1.0));
-    let other = select(vec3f(1.0, 0.0, 0.0), vec3f(0.0, 1.0, 0.0), abs(z.x) > 0.7);
-    let x = normalize_or(cross(other, z), vec3f(1.0, 0.0, 0.0));
-    return ShellRay(origin, transpose(mat3x3f(x, cross(z, x), z)), first, for_shadow);
-}
 
 // Texture space coordinates of a point of a prism.
 fn in_texture(point: PrismPoint, uvs: mat3x2f, prism: Prism) -> vec3f {
     let w = vec3f(1.0 - point.weights.x - point.weights.y, point.weights);
     let normal = w.x * prism.n0 + w.y * prism.n1 + w.z * prism.n2;
-    return vec3f(uvs * w, material.base + point.rise * length(normal) / material.scale);
+    return vec3f(uvs * w, height_info.base + point.rise * length(normal) / height_info.scale);
 }
 
 // Follows a ray through one prism, nearer than `best`.
 fn through_prism(ray: ShellRay, shell_prism: ShellPrism, best: ShellHit) -> ShellHit {
-    let at = 3u * shell_prism.face;
-    let a = vertices[triangles[at]];
-    let b = vertices[triangles[at + 1u]];
-    let c = vertices[triangles[at + 2u]];
+    let a = corner_of(shell_prism.face, 0u);
+    let b = corner_of(shell_prism.face, 1u);
+    let c = corner_of(shell_prism.face, 2u);
     var prism: Prism;
     prism.p0 = ray.across * (a.place.xyz - ray.origin);
     prism.p1 = ray.across * (b.place.xyz - ray.origin);
@@ -66,18 +40,26 @@ fn through_prism(ray: ShellRay, shell_prism: ShellPrism, best: ShellHit) -> Shel
     prism.n2 = ray.across * c.up.xyz;
     var span = prism_span(prism, shell_prism.low, shell_prism.high);
     var result = best;
+    // Over the triangle on which it starts a light ray is where its start's numbers say.
+    let on_relief = ray.starts_here && ray.start.strip == PRISM;
+    let own = on_relief && shell_prism.face == ray.start.face;
     if !(span.leave.t > max(span.enter.t, ray.first)) || span.enter.t >= best.t {
         return result;
     }
-    let at_start = span.enter.t < ray.first;
-    if at_start {
-        let share = (ray.first - span.enter.t) / (span.leave.t - span.enter.t);
+    if own || span.enter.t < ray.first {
+        let share = clamp((ray.first - span.enter.t) / (span.leave.t - span.enter.t), 0.0, 1.0);
         span.enter = prism_point(prism, ray.first, mix_points(span.enter, span.leave, share));
     }
     let uvs = mat3x2f(vec2f(a.place.w, a.up.w), vec2f(b.place.w, b.up.w), vec2f(c.place.w, c.up.w));
-    let size = vec2f(material.map_width, material.map_height);
-    let enter = in_texture(span.enter, uvs, prism);
+    let size = height_info.size;
+    var enter = in_texture(span.enter, uvs, prism);
+    if own {
+        let w = ray.start.weights;
+        enter = vec3f(uvs * vec3f(1.0 - w.x - w.y, w), ray.start.height);
+    }
     let leave = in_texture(span.leave, uvs, prism);
+    // Nearer to the surface than this, in heights, it cannot be told on which side of it the ray comes in.
+    let slack = min(2.0 * (ray.rounding + SHELL_ROUNDING * abs(span.enter.t)) / height_info.scale, ON_SURFACE);
     let halfway = prism_point(prism, mix(span.enter.t, span.leave.t, 0.5), mix_points(span.enter, span.leave, 0.5));
     let off = in_texture(halfway, uvs, prism) - 0.5 * (enter + leave);
     let sag = max(length(off.xy * size) / SAG.x, abs(off.z) / SAG.y);
@@ -96,25 +78,40 @@ fn through_prism(ray: ShellRay, shell_prism: ShellPrism, best: ShellHit) -> Shel
             end = in_texture(there, uvs, prism);
         }
         // No branch on what is the same for the whole draw: Mesa 22.3 takes such branches out of loops, and fails.
-        let period = tile_period();
-        let tile = floor(start.xy / select(1.0, period, period > 0.0)) * period;
+        let periodic = solid.period > 0.0;
+        let tile = floor(start.xy / select(1.0, solid.period, periodic)) * solid.period;
         let home = start - vec3f(tile, 0.0);
         let delta = end - start;
         var found: Found;
         var skipped = 0.0;
-        if chord == 0.0 {
-            inside = gap_above(home) < -ROUNDED_BELOW;
+        var from_surface = false;
+        let length_in_cells = max(length(delta.xy * size), 1e-30);
+        // Share of the chord that is still next to the start.
+        let done = here.t / max(there.t - here.t, 1e-30);
+        let beside = select(0.0, CREASE / length_in_cells - done, on_relief);
+        if chord == 0.0 && beside <= 0.0 {
+            let gap = gap_above(home);
+            inside = gap < -select(ROUNDED_BELOW, slack, ray.for_shadow);
+            from_surface = ray.for_shadow && abs(gap) <= slack;
         }
-        if inside {
+        if beside > 0.0 {
+            skipped = min(beside, 1.0);
+            inside = gap_above(home + delta * skipped) <= 0.0;
+        } else if inside {
             skipped = emerges(home, delta);
             inside = skipped > 1.0;
         }
-        if skipped > 1.0 {
+        if inside && beside > 0.0 && (beside < 1.0 || delta.z <= 0.0) {
+            found = found_hit(0.0, 1u);
+        } else if inside || skipped == 1.0 {
             found = found_left(1u);
+            skipped = 0.0;
+        } else if beside > 0.0 {
+            found = search_within(home + delta * skipped, delta * (1.0 - skipped));
         } else if skipped > 0.0 && (sees_inside || ray.for_shadow) {
             found = found_hit(0.0, 1u);
             from_inside = true;
-        } else if skipped > 0.0 || ray.for_shadow {
+        } else if skipped > 0.0 || from_surface {
             found = search_away_within(home + delta * skipped, delta * (1.0 - skipped));
         } else {
             found = search_within(home, delta);
@@ -132,6 +129,7 @@ fn through_prism(ray: ShellRay, shell_prism: ShellPrism, best: ShellHit) -> Shel
             result.status = 0u;
             result.t = t;
             result.face = shell_prism.face;
+            result.strip = PRISM;
             result.weights = point.weights;
             return result;
         }

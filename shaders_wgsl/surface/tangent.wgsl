@@ -3,13 +3,15 @@
 #import "lib/surface_point.wgsl"
 #import "bindings/material.wgsl"
 #import "bindings/normal_map.wgsl"
+#import "lib/gloss.wgsl"
 #import "lib/perturb.wgsl"
 #import "lib/slope_wrap.wgsl"
 #import "shading/branches.wgsl"
 
 fn shading_normal(point: SurfacePoint) -> vec3f {
-    let texel = textureSampleGrad(normal_texture, normal_sampler, point.uv, point.uv_dx, point.uv_dy).xyz;
-    var normal_ts = texel * 2.0 - 1.0;
+    let texel = textureSampleGrad(normal_texture, normal_sampler, point.uv, point.uv_dx, point.uv_dy);
+    slope_variance = (1.0 - texel.w) / max(texel.w, 1e-3);
+    var normal_ts = texel.xyz * 2.0 - 1.0;
     if wrap_mode() == WRAP_MIRROR {
         let size = vec2f(textureDimensions(normal_texture));
         normal_ts = vec3f(normal_ts.xy * slope_factor(point.uv, size, WRAP_MIRROR), normal_ts.z);

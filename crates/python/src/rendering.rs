@@ -128,6 +128,8 @@ impl PyRenderer {
         shadows: Option<bool>,
         horizon: Option<(u32, f32)>,
         silhouettes: bool,
+        samples: u32,
+        specular_aa: bool,
         aovs: Vec<String>,
         skips: Vec<String>,
     ) -> PyResult<Self> {
@@ -152,7 +154,7 @@ impl PyRenderer {
         };
         let horizon = horizon.map(|(azimuths, softness)| HorizonShadows { azimuths, softness });
         let plain = Request::new(technique, size[0], size[1]);
-        let request = Request { shadows, horizon, silhouettes, aovs, skips, ..plain };
+        let request = Request { shadows, horizon, silhouettes, samples, specular_aa, aovs, skips, ..plain };
         let made = run(py, None, |_| Renderer::new(render::device()?, scene, request))?;
         let reads = match &technique {
             TechniqueChoice::Search(technique) => Some(technique.info.reads),

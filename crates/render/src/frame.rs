@@ -28,7 +28,7 @@ pub struct Aovs {
     pub ray_delta: Option<Vec<f32>>,
 }
 
-/// What it took. Times are milliseconds.
+/// What it took. Times are milliseconds; of several samples a pixel all are counted.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Stats {
     /// Checking the scene, baking maps, uploading what the device did not have.
@@ -66,6 +66,17 @@ pub struct Stats {
     pub shadow_rays: u64,
     /// What was left out.
     pub skipped: Skipped,
+}
+
+impl Stats {
+    /// Adds the times of another rendering that belongs to the same picture.
+    pub(crate) fn add_times(&mut self, other: &Self) {
+        self.prepare_ms += other.prepare_ms;
+        self.compile_ms += other.compile_ms;
+        self.draw_ms += other.draw_ms;
+        self.readback_ms += other.readback_ms;
+        self.total_ms += other.total_ms;
+    }
 }
 
 /// A picture and what came with it.

@@ -19,6 +19,9 @@ pub(crate) struct Geometry {
     pub indices: wgpu::Buffer,
 }
 
+/// In the number of a triangle: a strip along one of its edges. Twin of `shaders_wgsl/entry/displaced.wgsl`.
+const ON_STRIP: u32 = 1 << 31;
+
 /// Triangles of a box whose corners are numbered by a bit for each axis.
 pub(crate) const CUBOID: [[u32; 3]; 12] = [
     [0, 4, 6],
@@ -115,7 +118,9 @@ impl Geometry {
     pub fn micro(device: &Device, displaced: &Displaced) -> Result<Self, RenderError> {
         let mut attributes = Attributes::default();
         attributes.add(device, 0, bytemuck::cast_slice(&displaced.positions))?;
-        attributes.add(device, 8, bytemuck::cast_slice(&displaced.faces))?;
+        let mut faces = displaced.faces.clone();
+        faces[displaced.first_strip..].iter_mut().for_each(|face| *face |= ON_STRIP);
+        attributes.add(device, 8, bytemuck::cast_slice(&faces))?;
         attributes.add(device, 9, bytemuck::cast_slice(&displaced.weights))?;
         let bytes = bytemuck::cast_slice(&displaced.indices);
         let indices = device.buffer_with("micro-triangles", bytes, wgpu::BufferUsages::INDEX)?;

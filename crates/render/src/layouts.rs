@@ -27,7 +27,7 @@ pub struct Layouts {
     /// Group 1: corners, and a buffer that goes with their cells: cone ratios or distances.
     pub cells: BindGroupLayout,
     draw: BindGroupLayout,
-    draw_with_shell: BindGroupLayout,
+    draw_with_solids: BindGroupLayout,
     /// Group 0 of the march kernel.
     pub march: BindGroupLayout,
     material: [BindGroupLayout; 3],
@@ -43,20 +43,16 @@ impl Layouts {
         let seen = ShaderStages::FRAGMENT | ShaderStages::COMPUTE;
         let heights_filter =
             if filterable { SamplerBindingType::Filtering } else { SamplerBindingType::NonFiltering };
-        let draw = [
-            BindGroupLayoutEntry {
-                ty: BindingType::Buffer {
-                    ty: BufferBindingType::Storage { read_only: true },
-                    has_dynamic_offset: true,
-                    min_binding_size: None,
-                },
-                ..entry(0, ShaderStages::VERTEX_FRAGMENT, storage(true))
+        let place = BindGroupLayoutEntry {
+            ty: BindingType::Buffer {
+                ty: BufferBindingType::Storage { read_only: true },
+                has_dynamic_offset: true,
+                min_binding_size: None,
             },
-            entry(1, ShaderStages::FRAGMENT, storage(true)),
-            entry(2, ShaderStages::FRAGMENT, storage(true)),
-            entry(3, ShaderStages::FRAGMENT, storage(true)),
-            entry(4, ShaderStages::FRAGMENT, storage(true)),
-        ];
+            ..entry(0, ShaderStages::VERTEX_FRAGMENT, storage(true))
+        };
+        let mut draw = vec![place];
+        draw.extend((1..=9).map(|binding| entry(binding, ShaderStages::FRAGMENT, storage(true))));
         let material = [
             entry(0, ShaderStages::FRAGMENT, uniform()),
             entry(1, ShaderStages::FRAGMENT, texture(true, TextureViewDimension::D2)),
@@ -101,7 +97,7 @@ impl Layouts {
                 &[entry(0, seen, storage(true)), entry(1, seen, storage(true)), entry(2, seen, uniform())],
             ),
             draw: make("draw", &draw[..1]),
-            draw_with_shell: make("draw with its shell", &draw),
+            draw_with_solids: make("draw among solids", &draw),
             march: make(
                 "march",
                 &[
@@ -119,9 +115,9 @@ impl Layouts {
         }
     }
 
-    /// The layout of group 3; `shell`: with the mesh and the shell around it.
-    pub fn draw(&self, shell: bool) -> &BindGroupLayout {
-        if shell { &self.draw_with_shell } else { &self.draw }
+    /// The layout of group 3; `solids`: with all meshes of the scene and the shells around them.
+    pub fn draw(&self, solids: bool) -> &BindGroupLayout {
+        if solids { &self.draw_with_solids } else { &self.draw }
     }
 
     /// The layout of group 2; `horizon`: with a horizon map at bindings 7 to 9.
@@ -133,11 +129,6 @@ impl Layouts {
             MaterialMaps::MapAndCube => 2,
         }]
     }
-}
-
-/// Whether an entry finds out for itself which triangle it sees, and traces rays through the shell.
-pub fn reads_shell(entry: &str) -> bool {
-    matches!(entry, "displaced" | "shell")
 }
 
 fn entry(binding: u32, visibility: ShaderStages, ty: BindingType) -> BindGroupLayoutEntry {

@@ -30,6 +30,7 @@ mod readback;
 pub mod render;
 pub mod renderer;
 pub mod request;
+mod resolve;
 pub mod scene;
 mod shell;
 pub mod skips;

@@ -167,7 +167,7 @@ fn surface_map(
             upload("normals", wgpu::TextureFormat::Rgba8Unorm, &texture::own_8_bit(image))
         })?,
         (None, false) => device.keep(field, Kind::Slopes, || {
-            upload("slopes", wgpu::TextureFormat::Rg16Float, &texture::slopes(field)?)
+            upload("slopes", wgpu::TextureFormat::Rgba16Float, &texture::slopes(field)?)
         })?,
         (None, true) => device.keep(field, Kind::Baked8Bit, || {
             upload("normals", wgpu::TextureFormat::Rgba8Unorm, &texture::baked_8_bit(field)?)

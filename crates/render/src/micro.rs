@@ -38,13 +38,9 @@ impl View<'_> {
     }
 }
 
-/// Cuts a draw and displaces it: what of it may be in the picture, or only the bridges between its charts. Also
-/// says by how much micro-polygons had to be larger than a pixel to keep their number down; 1 when they need not.
-pub(crate) fn displaced(
-    draw: &Draw<'_>,
-    view: &View<'_>,
-    only_bridges: bool,
-) -> Result<(Displaced, f64), RenderError> {
+/// Cuts what of a draw may be in the picture and displaces it. Also says by how much micro-polygons had to be larger
+/// than a pixel to keep their number down; 1 when they need not.
+pub(crate) fn displaced(draw: &Draw<'_>, view: &View<'_>) -> Result<(Displaced, f64), RenderError> {
     let field = &draw.material.field;
     let extent = field.extent();
     let texels = [field.width() as f64, field.height() as f64];
@@ -82,12 +78,7 @@ pub(crate) fn displaced(
             origin: view.centre,
             limit: MOST,
         };
-        let made = if only_bridges {
-            mesh::bridges(&draw.mesh, &cut, &relief)
-        } else {
-            mesh::displace(&draw.mesh, &cut, &relief)
-        };
-        match made {
+        match mesh::displace(&draw.mesh, &cut, &relief) {
             Ok(displaced) => return Ok((displaced, coarser)),
             // Numbers of triangles go with the square; what cannot be cut any less ends the search.
             Err(MeshError::TooLarge { got, limit, .. }) if coarser < 1e6 => {

@@ -6,7 +6,6 @@ use heightfield::technique::Reads;
 use heightfield::{HeightField, Technique};
 
 use crate::device::lock;
-use crate::layouts::reads_shell;
 use crate::request::Program;
 use crate::targets::{DEPTH_FORMAT, TARGET_FORMATS, TargetSet};
 use crate::{Device, RenderError, TechniqueChoice, tally};
@@ -67,14 +66,9 @@ pub(crate) fn reads_of(technique: &TechniqueChoice) -> Option<Reads> {
 pub(crate) fn constants_of(technique: &Technique, field: &HeightField) -> Vec<(&'static str, i64)> {
     let mut constants: Vec<_> = technique.settings().map(|(name, value)| (name, value as i64)).collect();
     if technique.info.reads == Reads::Pyramid {
-        constants.push(endless(field));
+        constants.push(("endless", i64::from(!field.is_periodic())));
     }
     constants
-}
-
-/// The constant of programs that read the skip pyramid.
-pub(crate) fn endless(field: &HeightField) -> (&'static str, i64) {
-    ("endless", i64::from(!field.is_periodic()))
 }
 
 impl Device {
@@ -163,7 +157,7 @@ impl Device {
                 Some(&self.layouts.frame),
                 self.field_layout(key.reads),
                 Some(self.layouts.material(key.program.maps, key.program.horizon)),
-                Some(self.layouts.draw(reads_shell(key.program.entry))),
+                Some(self.layouts.draw(shaders::traces_solids(key.program.entry))),
             ],
             immediate_size: 0,
         });

@@ -118,7 +118,7 @@ pub const PLAIN_TECHNIQUES: [PlainTechnique; 10] = [
         entry: "displaced",
         surface: "displaced",
         maps: MaterialMaps::Map,
-        reads: Some(Reads::Pyramid),
+        reads: None,
         own_normals: Some(("displaced", "tangent")),
         displaces: true,
     },

@@ -7,17 +7,17 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use glam::DVec3;
+use heightfield::technique::Reads;
 use mesh::Mesh;
 
 use crate::clusters::{Cluster, Clusters};
 use crate::geometry::{Attributes, CUBOID, Geometry};
 use crate::heights::bind;
 use crate::materials::{MaterialKey, material_group};
-use crate::pipeline::{Pipeline, PipelineKey, attributes, constants_of, endless, reads_of};
+use crate::pipeline::{Pipeline, PipelineKey, attributes, constants_of, reads_of};
 use crate::request::Program;
-use crate::shell::Shell;
+use crate::shell::SceneSolids;
 use crate::targets::TargetSet;
-use crate::triangles::Triangles;
 use crate::uniforms::DrawInfo;
 use crate::{Device, Draw, RenderError, Request, Stats, TechniqueChoice};
 
@@ -33,8 +33,6 @@ pub(crate) struct Fixed {
 /// What is cut anew for each view; its pipeline is compiled when the first cut gives anything.
 pub(crate) struct Cutting {
     pub key: PipelineKey,
-    /// Only the bridges between charts.
-    pub only_bridges: bool,
 }
 
 /// A draw, ready.
@@ -54,13 +52,6 @@ struct Run {
     groups: Arc<[Cluster]>,
 }
 
-/// A shell on the device.
-#[derive(Clone)]
-struct ShellParts {
-    place: wgpu::BindGroup,
-    cuboid: Geometry,
-}
-
 /// What draws share. Everything is known by where it is in memory, which the scene keeps alive.
 pub(crate) struct Shared {
     /// Places of the draws in a view, [`Shared::stride`] bytes apart.
@@ -69,8 +60,8 @@ pub(crate) struct Shared {
     pub stride: u64,
     meshes: HashMap<(usize, &'static [usize]), Attributes>,
     runs: HashMap<(usize, u32, u32), Run>,
-    vertices: HashMap<usize, Triangles>,
-    shells: HashMap<(usize, usize, u32, u32), ShellParts>,
+    /// Boxes around solids, by the solids' numbers.
+    boxes: HashMap<u32, Geometry>,
     materials: HashMap<MaterialKey, wgpu::BindGroup>,
     place: wgpu::BindGroup,
 }
@@ -101,74 +92,69 @@ impl Shared {
         let stride = (size_of::<DrawInfo>() as u64).next_multiple_of(alignment);
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
         let places = device.buffer("places", stride * draws.max(1) as u64, usage)?;
-        let place = place_group(device, &places, None)?;
+        let place = place_group(device, &places, Vec::new())?;
         Ok(Self {
             places,
             stride,
             place,
             meshes: HashMap::new(),
             runs: HashMap::new(),
-            vertices: HashMap::new(),
-            shells: HashMap::new(),
+            boxes: HashMap::new(),
             materials: HashMap::new(),
         })
     }
 
-    /// Prepares a draw whose mesh has its middle at `middle`.
+    /// Prepares a draw whose mesh has its middle at `middle`. `solids`: of the scene and the number of its own, where
+    /// rays are traced through shells.
     pub fn prepare(
         &mut self,
         device: &Device,
         draw: &Draw<'_>,
         middle: DVec3,
+        solids: Option<(&SceneSolids, u32)>,
         request: &Request,
         shadows: bool,
         stats: &mut Stats,
     ) -> Result<Prepared, RenderError> {
-        let has_height = draw.material.field.extent().scale > 0.0;
-        // A shell of no height holds nothing; on the mesh itself the search sees the same.
-        let in_shell = request.in_shell() && has_height;
-        let displaces = request.technique.draws_geometry();
-        let has_shell = in_shell || displaces;
         let mut program = request.technique.program(draw.material.normal.is_some());
-        program.horizon = !has_shell
+        program.horizon = solids.is_none()
             && request.horizon.is_some()
             && request.shadows != Some(false)
             && request.technique.takes_horizon();
-        // Light rays through a relief of no height meet nothing.
-        let shadows = shadows && (has_height || !has_shell);
-        let key = |program| key(draw, request, program, shadows);
+        let reads = reads_of(&request.technique).filter(|_| solids.is_none());
+        let key = |program| key(draw, request, program, reads, shadows);
 
-        let field = reads_of(&request.technique)
-            .map(|reads| device.field_group(&draw.material.field, reads))
-            .transpose()?;
+        let field = reads.map(|reads| device.field_group(&draw.material.field, reads)).transpose()?;
         let material = entry(&mut self.materials, MaterialKey::new(&draw.material, program), || {
             material_group(device, &draw.material, program, request.horizon, stats)
         })?;
-        if !has_shell {
-            let locations = attributes(program.entry);
-            let geometry = entry(&mut self.meshes, (address(&draw.mesh), locations), || {
-                Attributes::new(device, &draw.mesh, middle, locations)
+        if let Some((solids, own)) = solids {
+            let place = solids.group();
+            if request.technique.draws_geometry() {
+                let cutting = Some(Cutting { key: key(program) });
+                return Ok(Prepared { field, material, place, fixed: None, cutting });
+            }
+            let geometry = entry(&mut self.boxes, own, || {
+                let [low, high] = solids.bounds(own);
+                Geometry::cuboid(device, low, high)
             })?;
-            let Run { indices, groups } = self.run(device, draw, middle)?;
-            let fixed = Fixed {
-                pipeline: compiled(device, key(program), stats)?,
-                geometry: Geometry { attributes: geometry, indices },
-                triangles: draw.triangles.end - draw.triangles.start,
-                groups: Some(groups),
-            };
-            let place = self.place.clone();
-            return Ok(Prepared { field, material, place, fixed: Some(fixed), cutting: None });
-        }
-        let ShellParts { place, cuboid } = self.shell(device, draw, middle)?;
-        let cut = Program { entry: "displaced", ..program };
-        let cutting = Some(Cutting { key: key(cut), only_bridges: in_shell });
-        let fixed = if in_shell {
             let pipeline = compiled(device, key(Program { entry: "shell", ..program }), stats)?;
-            Some(Fixed { pipeline, geometry: cuboid, triangles: CUBOID.len() as u32, groups: None })
-        } else {
-            None
+            let fixed = Some(Fixed { pipeline, geometry, triangles: CUBOID.len() as u32, groups: None });
+            return Ok(Prepared { field, material, place, fixed, cutting: None });
+        }
+        let locations = attributes(program.entry);
+        let geometry = entry(&mut self.meshes, (address(&draw.mesh), locations), || {
+            Attributes::new(device, &draw.mesh, middle, locations)
+        })?;
+        let Run { indices, groups } = self.run(device, draw, middle)?;
+        let fixed = Fixed {
+            pipeline: compiled(device, key(program), stats)?,
+            geometry: Geometry { attributes: geometry, indices },
+            triangles: draw.triangles.end - draw.triangles.start,
+            groups: Some(groups),
         };
-        Ok(Prepared { field, material, place, fixed, cutting })
+        let place = self.place.clone();
+        Ok(Prepared { field, material, place, fixed: Some(fixed), cutting: None })
     }
 
     fn run(&mut self, device: &Device, draw: &Draw<'_>, middle: DVec3) -> Result<Run, RenderError> {
@@ -178,21 +164,6 @@ impl Shared {
             let bytes = bytemuck::cast_slice(&triangles);
             let indices = device.buffer_with("triangles", bytes, wgpu::BufferUsages::INDEX)?;
             Ok(Run { indices, groups: groups.into() })
-        })
-    }
-
-    fn shell(&mut self, device: &Device, draw: &Draw<'_>, middle: DVec3) -> Result<ShellParts, RenderError> {
-        let (mesh, run) = (address(&draw.mesh), &draw.triangles);
-        let field = Arc::as_ptr(&draw.material.field) as usize;
-        let (vertices, places) = (&mut self.vertices, &self.places);
-        entry(&mut self.shells, (mesh, field, run.start, run.end), || {
-            let shell = Shell::new(device, draw, middle)?;
-            let triangles = entry(vertices, mesh, || Triangles::new(device, &draw.mesh, middle))?;
-            let [low, high] = shell.bounds;
-            Ok(ShellParts {
-                place: place_group(device, places, Some((&triangles, &shell)))?,
-                cuboid: Geometry::cuboid(device, low, high)?,
-            })
         })
     }
 }
@@ -209,13 +180,19 @@ pub(crate) fn compiled(
     pipeline
 }
 
-fn key(draw: &Draw<'_>, request: &Request, program: Program, shadows: bool) -> PipelineKey {
+fn key(
+    draw: &Draw<'_>,
+    request: &Request,
+    program: Program,
+    reads: Option<Reads>,
+    shadows: bool,
+) -> PipelineKey {
     let mut constants = Vec::new();
-    if let TechniqueChoice::Search(technique) = &request.technique {
+    if let (TechniqueChoice::Search(technique), Some(_)) = (&request.technique, reads) {
         constants = constants_of(technique, &draw.material.field);
     }
-    if request.technique.draws_geometry() {
-        constants.push(endless(&draw.material.field));
+    if program.entry != "dot3" {
+        constants.push(("specular_aa", i64::from(request.specular_aa)));
     }
     if program.search.is_some() && !program.horizon {
         constants.push(("cast_shadows", i64::from(shadows)));
@@ -225,7 +202,7 @@ fn key(draw: &Draw<'_>, request: &Request, program: Program, shadows: bool) -> P
     }
     PipelineKey {
         program,
-        reads: reads_of(&request.technique),
+        reads,
         constants,
         targets: TargetSet::of(request.aovs),
         double_sided: draw.material.double_sided,
@@ -233,28 +210,24 @@ fn key(draw: &Draw<'_>, request: &Request, program: Program, shadows: bool) -> P
     }
 }
 
-/// Group 3, with the mesh and its shell where there is one.
-fn place_group(
+/// Group 3, with entries of all solids of the scene where there are any.
+pub(crate) fn place_group(
     device: &Device,
     places: &wgpu::Buffer,
-    shell: Option<(&Triangles, &Shell)>,
+    solids: Vec<wgpu::BindGroupEntry<'_>>,
 ) -> Result<wgpu::BindGroup, RenderError> {
     let place = wgpu::BufferBinding {
         buffer: places,
         offset: 0,
         size: NonZeroU64::new(size_of::<DrawInfo>() as u64),
     };
+    let layout = device.layouts.draw(!solids.is_empty());
     let mut entries = vec![bind(0, wgpu::BindingResource::Buffer(place))];
-    if let Some((triangles, shell)) = shell {
-        entries.push(bind(1, triangles.vertices.as_entire_binding()));
-        entries.push(bind(2, triangles.indices.as_entire_binding()));
-        entries.push(bind(3, shell.nodes.as_entire_binding()));
-        entries.push(bind(4, shell.prisms.as_entire_binding()));
-    }
+    entries.extend(solids);
     device.guard("binding a draw", || {
         Ok(device.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("draw"),
-            layout: device.layouts.draw(shell.is_some()),
+            layout,
             entries: &entries,
         }))
     })

@@ -12,13 +12,15 @@ use crate::frame_binding::FrameBinding;
 use crate::geometry::Room;
 use crate::prepare::{Prepared, Shared, address};
 use crate::readback::Readback;
+use crate::resolve::resolve;
+use crate::shell::SceneSolids;
 use crate::tally::Tally;
 use crate::targets::{TargetSet, Targets};
 use crate::timer::Timer;
 use crate::uniforms::DrawInfo;
 use crate::unpack::Unpacker;
 use crate::view::{Call, ViewOf};
-use crate::{Camera, Device, Frame, Held, RenderError, Request, Scene, Skips, Stats, tally};
+use crate::{AovSet, Camera, Device, Frame, Held, RenderError, Request, Scene, Skips, Stats, tally};
 
 /// Pixels drawn at once. Larger pictures are drawn in bands of rows, so that the memory that the
 /// targets take does not grow with the picture.
@@ -40,7 +42,13 @@ pub struct Renderer<'a> {
     rows_at_once: u32,
     rooms: HashMap<usize, Room>,
     shared: Shared,
+    /// Where rays are traced through shells, from the first view on.
+    solids: Option<SceneSolids>,
     draws: Vec<Option<Prepared>>,
+    /// Samples along a side of a pixel; the request is for as many more pixels.
+    across: u32,
+    /// Additional outputs where there are several samples a pixel.
+    central: Option<Box<Self>>,
     targets: Targets,
     frame: FrameBinding,
     spare: Vec<Readback>,
@@ -54,6 +62,7 @@ pub struct Renderer<'a> {
 /// A band that the device is drawing, and what is known of its picture.
 struct UnderWay {
     ticket: Ticket,
+    central: Option<Ticket>,
     started: Instant,
     band: Band,
     unpacker: Unpacker,
@@ -102,6 +111,15 @@ impl<'a> Renderer<'a> {
         let (started, before) = (Instant::now(), Tally::now());
         let device = device.into();
         device.check_process()?;
+        let across = request.samples_across()?;
+        let wants_central = across > 1 && request.aovs != AovSet::NONE;
+        let central = wants_central
+            .then(|| {
+                let central = Request { samples: 1, ..request };
+                Self::in_bands(device.clone(), scene.clone(), central, band_pixels).map(Box::new)
+            })
+            .transpose()?;
+        let request = request.of_samples(across);
         let (width, height) = (request.width, request.height);
         if width == 0 || height == 0 {
             return Err(RenderError::Size { width, height });
@@ -118,6 +136,9 @@ impl<'a> Renderer<'a> {
         let mut renderer = Self {
             shadows: request.shadows.unwrap_or(true) && request.technique.casts_shadows(),
             rooms,
+            across,
+            central,
+            solids: None,
             shared: Shared::new(&device, scene.draws.len())?,
             draws: scene.draws.iter().map(|_| None).collect(),
             targets: Targets::new(&device, TargetSet::of(request.aovs), width, rows_at_once)?,
@@ -155,6 +176,7 @@ impl<'a> Renderer<'a> {
         let (started, before) = (Instant::now(), Tally::now());
         self.device.check_process()?;
         camera.validate()?;
+        let central = self.central.as_mut().map(|central| central.start(camera)).transpose()?;
         let mut stats = std::mem::take(&mut self.unclaimed);
         let (compiled, mut warnings) = (stats.compile_ms, self.warnings.clone());
         let calls = self.view(&camera, &mut stats, &mut warnings)?;
@@ -175,7 +197,7 @@ impl<'a> Renderer<'a> {
         stats.pipelines_compiled += spent.pipelines - before.pipelines;
         let ticket = Ticket(self.tickets);
         self.tickets += 1;
-        self.under_way.push_back(UnderWay { ticket, started, band, unpacker, stats, warnings });
+        self.under_way.push_back(UnderWay { ticket, central, started, band, unpacker, stats, warnings });
         Ok(ticket)
     }
 
@@ -185,13 +207,23 @@ impl<'a> Renderer<'a> {
     /// The device's faults, or a ticket that is not under way.
     pub fn finish(&mut self, ticket: Ticket) -> Result<Frame, RenderError> {
         self.device.check_process()?;
-        let Some(UnderWay { started, band, mut unpacker, mut stats, warnings, .. }) = self.take(ticket)
+        let Some(UnderWay { central, started, band, mut unpacker, mut stats, warnings, .. }) =
+            self.take(ticket)
         else {
             return Err(RenderError::Scene(format!("picture {} is not under way", ticket.0)));
         };
         self.collect(band, &mut unpacker, &mut stats)?;
         stats.device_clock = self.device.has_timestamps();
         let mut frame = unpacker.finish(&mut stats);
+        if self.across > 1 {
+            frame.color = resolve(&frame.color, frame.width as usize, self.across as usize);
+            (frame.width, frame.height) = (frame.width / self.across, frame.height / self.across);
+        }
+        if let (Some(renderer), Some(ticket)) = (&mut self.central, central) {
+            let central = renderer.finish(ticket)?;
+            frame.aovs = central.aovs;
+            stats.add_times(&central.stats);
+        }
         stats.total_ms = started.elapsed().as_secs_f64() * 1e3;
         frame.stats = stats;
         frame.warnings = warnings;
@@ -200,7 +232,10 @@ impl<'a> Renderer<'a> {
 
     /// Gives a picture up.
     pub fn abandon(&mut self, ticket: Ticket) {
-        self.take(ticket);
+        let given_up = self.take(ticket).and_then(|work| work.central);
+        if let (Some(renderer), Some(ticket)) = (&mut self.central, given_up) {
+            renderer.abandon(ticket);
+        }
     }
 
     /// Pictures of many views in turn, each read back while the next one is drawn.
@@ -251,8 +286,8 @@ impl<'a> Renderer<'a> {
         let relative =
             DMat4::from_translation(-camera.eye) * draw.world_from_object * DMat4::from_translation(middle);
         // What stays on the mesh covers the mesh, whatever depth it shows.
-        let moves = self.request.in_shell() || self.request.technique.draws_geometry();
-        let reach = if moves { f64::from(draw.material.field.extent().scale) } else { 0.0 };
+        let reach =
+            if self.request.traces_solids() { f64::from(draw.material.field.extent().scale) } else { 0.0 };
         let stand = Stand::new(relative, radius + reach, draw.material.double_sided);
         let seen = !draw.triangles.is_empty() && !culling.misses(relative.w_axis.truncate(), stand.radius);
         seen.then_some(stand)
@@ -280,6 +315,28 @@ impl<'a> Renderer<'a> {
         culling.settle_walls();
     }
 
+    /// Builds the solids of the scene where rays are traced through them and places them for a view: all of them, since
+    /// what is outside the picture may throw a shadow into it. Gives each draw's number among the instances.
+    fn place_solids(&mut self, camera: &Camera) -> Result<Vec<u32>, RenderError> {
+        if !self.request.traces_solids() {
+            return Ok(Vec::new());
+        }
+        let middle = |draw: &crate::Draw<'_>| self.rooms.get(&address(&draw.mesh)).map(|room| room.middle);
+        let middles: Vec<_> = self.scene.draws.iter().map(|draw| middle(draw).unwrap_or_default()).collect();
+        let solids = match self.solids.take() {
+            Some(solids) => solids,
+            None => SceneSolids::new(&self.device, &self.scene, &middles, &self.shared.places)?,
+        };
+        let away = DMat4::from_translation(-camera.eye);
+        let relative = |(draw, middle): (&crate::Draw<'_>, &glam::DVec3)| {
+            away * draw.world_from_object * DMat4::from_translation(*middle)
+        };
+        let relative: Vec<DMat4> = self.scene.draws.iter().zip(&middles).map(relative).collect();
+        let numbers = solids.place(&self.device, &relative)?;
+        self.solids = Some(solids);
+        Ok(numbers)
+    }
+
     /// What is drawn of a view, with its places and lights on the device.
     fn view(
         &mut self,
@@ -289,6 +346,7 @@ impl<'a> Renderer<'a> {
     ) -> Result<Vec<Call>, RenderError> {
         let mut culling = self.culling(camera);
         self.find_walls(camera, &mut culling);
+        let numbers = self.place_solids(camera)?;
         let mut view = ViewOf::new(&self.device, camera, &self.request, &culling);
         let stride = self.shared.stride as usize;
         let mut places = Vec::new();
@@ -308,12 +366,16 @@ impl<'a> Renderer<'a> {
             let middle = self.rooms.get(&address(&draw.mesh)).map_or(glam::DVec3::ZERO, |room| room.middle);
             if self.draws[at].is_none() {
                 let (request, shadows) = (&self.request, self.shadows);
-                let made = self.shared.prepare(&self.device, draw, middle, request, shadows, stats)?;
+                let solids = self.solids.as_ref().map(|solids| (solids, solids.of_draw(at)));
+                let made =
+                    self.shared.prepare(&self.device, draw, middle, solids, request, shadows, stats)?;
                 self.draws[at] = Some(made);
             }
             let Some(prepared) = &self.draws[at] else { continue };
+            let own = self.solids.as_ref().map_or([0; 2], |solids| [numbers[at], solids.of_draw(at)]);
             if view.add(at, draw, middle, prepared, &stand, places.len() as u32, stats, warnings)? {
-                places.extend_from_slice(bytemuck::bytes_of(&DrawInfo::of(stand.relative_from_object)));
+                let place = DrawInfo::of(stand.relative_from_object, own);
+                places.extend_from_slice(bytemuck::bytes_of(&place));
                 places.resize(places.len().next_multiple_of(stride), 0);
             }
         }

@@ -211,6 +211,11 @@ pub struct Request {
     /// Whether rays are traced through the shell around the mesh, so that outlines, depth and shadows are those
     /// of the displaced mesh; on a technique that cannot it is a warning.
     pub silhouettes: bool,
+    /// Samples a pixel: 1, or 4 or 16 in a square grid, searched and shaded each for itself and averaged in linear
+    /// light. Additional outputs are those of one sample in the middle of each pixel.
+    pub samples: u32,
+    /// Whether highlights widen by the slopes of the relief that a pixel averages over.
+    pub specular_aa: bool,
     /// Additional outputs.
     pub aovs: AovSet,
     /// What may be left out where the picture does not need it.
@@ -218,6 +223,30 @@ pub struct Request {
 }
 
 impl Request {
+    /// Samples along a side of a pixel.
+    pub(crate) fn samples_across(&self) -> Result<u32, RenderError> {
+        match self.samples {
+            1 => Ok(1),
+            4 => Ok(2),
+            16 => Ok(4),
+            other => Err(RenderError::Scene(format!("samples is {other}; it must be 1, 4 or 16"))),
+        }
+    }
+
+    /// The request of a picture that has a pixel for each sample.
+    pub(crate) fn of_samples(self, across: u32) -> Self {
+        if across == 1 {
+            return self;
+        }
+        let [width, height] = [self.width, self.height].map(|side| side.saturating_mul(across));
+        Self { width, height, samples: 1, aovs: AovSet::NONE, ..self }
+    }
+
+    /// Whether rays are traced through shells: for what is seen, or for shadows of what is displaced.
+    pub(crate) fn traces_solids(&self) -> bool {
+        self.in_shell() || self.technique.draws_geometry()
+    }
+
     /// Whether rays are traced through the shell.
     pub(crate) fn in_shell(&self) -> bool {
         self.silhouettes && self.technique.has_silhouettes()
@@ -238,6 +267,8 @@ impl Request {
             shadows: None,
             horizon: None,
             silhouettes: false,
+            samples: 1,
+            specular_aa: true,
             aovs: AovSet::NONE,
             skips: Skips::ALL,
         }

@@ -5,18 +5,16 @@ use mesh::Mesh;
 use rayon::prelude::*;
 
 use crate::uniforms::MeshVertex;
-use crate::{Device, RenderError};
 
-/// Bindings 1 and 2 of group 3, `shaders_wgsl/bindings/triangles.wgsl`.
-#[derive(Clone)]
-pub(crate) struct Triangles {
-    pub vertices: wgpu::Buffer,
-    pub indices: wgpu::Buffer,
+/// What a mesh adds to bindings 1 and 2 of group 3, `shaders_wgsl/bindings/solids.wgsl`.
+pub(crate) struct MeshArrays {
+    pub vertices: Vec<MeshVertex>,
+    pub indices: Vec<[u32; 3]>,
 }
 
-impl Triangles {
-    /// Uploads a mesh whose middle is `centre`.
-    pub fn new(device: &Device, mesh: &Mesh, centre: DVec3) -> Result<Self, RenderError> {
+impl MeshArrays {
+    /// Of a mesh whose middle is `centre`.
+    pub fn new(mesh: &Mesh, centre: DVec3) -> Self {
         let [dndu, dndv] = mesh.normal_derivatives();
         let vertex = |at: usize| {
             let (uv, tangent) = (mesh.uvs[at], mesh.tangents[at]);
@@ -29,11 +27,7 @@ impl Triangles {
                 dndv: dndv[at].extend(tangent.w),
             }
         };
-        let vertices: Vec<MeshVertex> = (0..mesh.positions.len()).into_par_iter().map(vertex).collect();
-        let storage = wgpu::BufferUsages::STORAGE;
-        Ok(Self {
-            vertices: device.buffer_with("mesh vertices", bytemuck::cast_slice(&vertices), storage)?,
-            indices: device.buffer_with("mesh triangles", bytemuck::cast_slice(&mesh.indices), storage)?,
-        })
+        let vertices = (0..mesh.positions.len()).into_par_iter().map(vertex).collect();
+        Self { vertices, indices: mesh.indices.clone() }
     }
 }

@@ -49,21 +49,76 @@ pub struct DrawInfo {
     pub object_from_relative: Mat4,
     /// Camera in the space of the centred mesh.
     pub eye: Vec4,
+    /// Its number among the instances, and that of its solid.
+    pub own: [u32; 4],
 }
 
 impl DrawInfo {
-    /// Of a mesh that stands there.
-    pub(crate) fn of(relative_from_object: DMat4) -> Self {
+    /// Of a mesh that stands there; `own` as in [`DrawInfo::own`].
+    pub(crate) fn of(relative_from_object: DMat4, [instance, solid]: [u32; 2]) -> Self {
         let object_from_relative = relative_from_object.inverse();
         Self {
             relative_from_object: relative_from_object.as_mat4(),
             object_from_relative: object_from_relative.as_mat4(),
             eye: object_from_relative.w_axis.as_vec4(),
+            own: [instance, solid, 0, 0],
         }
     }
 }
 
-/// Twin of `MeshVertex` in `shaders_wgsl/bindings/triangles.wgsl`.
+/// Twin of `Solid` in `shaders_wgsl/bindings/solids.wgsl`.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub struct SolidInfo {
+    /// Of its heights, with the pyramid's part.
+    pub heights: HeightInfo,
+    /// First node of its tree.
+    pub nodes: u32,
+    /// First prism.
+    pub prisms: u32,
+    /// First corner of its strips.
+    pub strips: u32,
+    /// First vertex.
+    pub vertices: u32,
+    /// First corner of its triangles.
+    pub triangles: u32,
+    /// First corner height.
+    pub corners: u32,
+    /// First maximum of its pyramid.
+    pub pyramid: u32,
+    /// 1 where the cells at the border go on for ever.
+    pub endless: u32,
+    /// Tiles after which the map repeats, 0 for never.
+    pub period: f32,
+    /// Radius of everything around the middle, mesh units.
+    pub radius: f32,
+    /// Padding.
+    pub pad_0: u32,
+    /// Padding.
+    pub pad_1: u32,
+}
+
+/// Twin of `Instance` in `shaders_wgsl/bindings/solids.wgsl`.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub struct InstanceInfo {
+    /// From the centred mesh to camera-relative world space.
+    pub relative_from_object: Mat4,
+    /// The inverse.
+    pub object_from_relative: Mat4,
+    /// Camera in the space of the centred mesh.
+    pub eye: Vec4,
+    /// Which solid.
+    pub solid: u32,
+    /// Padding.
+    pub pad_0: u32,
+    /// Padding.
+    pub pad_1: u32,
+    /// Padding.
+    pub pad_2: u32,
+}
+
+/// Twin of `MeshVertex` in `shaders_wgsl/bindings/solids.wgsl`.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub struct MeshVertex {
@@ -84,7 +139,13 @@ pub struct MeshVertex {
 /// What stands for the number of prisms of a node with children.
 pub const INNER_NODE: u32 = u32::MAX;
 
-/// Twin of `ShellNode` in `shaders_wgsl/bindings/shell.wgsl`.
+/// In place of a strip: a prism full of heights.
+pub const PRISM: u32 = u32::MAX;
+
+/// In place of a strip: the bare triangle.
+pub const PLAIN: u32 = u32::MAX - 1;
+
+/// Twin of `ShellNode` in `shaders_wgsl/bindings/solids.wgsl`.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub struct ShellNode {
@@ -98,7 +159,7 @@ pub struct ShellNode {
     pub count: u32,
 }
 
-/// Twin of `ShellPrism` in `shaders_wgsl/bindings/shell.wgsl`.
+/// Twin of `ShellPrism` in `shaders_wgsl/bindings/solids.wgsl`.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub struct ShellPrism {
@@ -108,8 +169,8 @@ pub struct ShellPrism {
     pub low: f32,
     /// Where it ends.
     pub high: f32,
-    /// Padding.
-    pub unused: u32,
+    /// Number of a triangle of a strip, [`PRISM`] or [`PLAIN`].
+    pub strip: u32,
 }
 
 /// Twin of `MaterialInfo` in `shaders_wgsl/bindings/material.wgsl`.

@@ -87,7 +87,7 @@ impl<'a> ViewOf<'a> {
                 self.calls.push(Call { draw: at, pipeline, geometry, runs, offset, span });
             }
         }
-        if let Some(Cutting { key, only_bridges }) = &prepared.cutting {
+        if let Some(Cutting { key }) = &prepared.cutting {
             let view = View {
                 camera: self.camera,
                 relative_from_object: stand.relative_from_object,
@@ -96,7 +96,7 @@ impl<'a> ViewOf<'a> {
                 size: [self.request.width, self.request.height],
                 culled: self.request.skips.contains(Skips::FRUSTUM),
             };
-            let (displaced, coarser) = micro::displaced(draw, &view, *only_bridges)?;
+            let (displaced, coarser) = micro::displaced(draw, &view)?;
             if coarser > 1.0 {
                 warnings.push(format!(
                     "draw {at}: micro-polygons are up to {coarser:.1} pixels wide, to keep their number down"

@@ -5,8 +5,8 @@
 use std::mem::offset_of;
 
 use render::uniforms::{
-    DistanceInfo, DrawInfo, FrameInfo, HeightInfo, HorizonInfo, LightInfo, MarchResult, MarchSegment,
-    MaterialInfo, MeshVertex, ShellNode, ShellPrism,
+    DistanceInfo, DrawInfo, FrameInfo, HeightInfo, HorizonInfo, InstanceInfo, LightInfo, MarchResult,
+    MarchSegment, MaterialInfo, MeshVertex, ShellNode, ShellPrism, SolidInfo,
 };
 use shaders::{Field, Layout};
 
@@ -45,8 +45,18 @@ fn host_structs_match() {
     let displaced = shaders::compose("shell", Some("exact"), Some("displaced")).unwrap();
     check(layout!(MeshVertex: place, up, dpdu, dpdv, dndu, dndv), &displaced, "MeshVertex");
     check(layout!(ShellNode: low, first, high, count), &displaced, "ShellNode");
-    check(layout!(ShellPrism: face, low, high, unused), &displaced, "ShellPrism");
-    check(layout!(DrawInfo: relative_from_object, object_from_relative, eye), &relief, "DrawInfo");
+    check(layout!(ShellPrism: face, low, high, strip), &displaced, "ShellPrism");
+    check(
+        layout!(SolidInfo: heights, nodes, prisms, strips, vertices, triangles, corners, pyramid, endless, period, radius, pad_0, pad_1),
+        &displaced,
+        "Solid",
+    );
+    check(
+        layout!(InstanceInfo: relative_from_object, object_from_relative, eye, solid, pad_0, pad_1, pad_2),
+        &displaced,
+        "Instance",
+    );
+    check(layout!(DrawInfo: relative_from_object, object_from_relative, eye, own), &relief, "DrawInfo");
     check(
         layout!(MaterialInfo: albedo_factor, map_width, map_height, scale, base, specular, shininess, period, wrap),
         &relief,

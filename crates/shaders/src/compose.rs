@@ -4,8 +4,17 @@ use thiserror::Error;
 
 static FILES: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/files.rs"));
 
-/// What stands in for the other ways to find shadows.
-const HORIZON_SHADOWS: &str = "shading/shadow_horizon.wgsl";
+/// Files in the place of others: what is asked for, and what stands in for it.
+type Replaced = &'static [(&'static str, &'static str)];
+
+/// With a horizon map: its shadows for all others.
+const HORIZON_SHADOWS: Replaced = &[
+    ("shading/shadow_none.wgsl", "shading/shadow_horizon.wgsl"),
+    ("shading/shadow_search.wgsl", "shading/shadow_horizon.wgsl"),
+];
+
+/// Where rays go through shells: the heights of all solids of the scene for those of one draw.
+const SOLID_HEIGHTS: Replaced = &[("bindings/pyramid.wgsl", "bindings/solid_heights.wgsl")];
 
 /// A program that cannot be put together.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -47,7 +56,13 @@ pub fn read(path: &str) -> Option<&'static str> {
 /// # Errors
 /// [`ComposeError`] when a file is missing or an import malformed.
 pub fn compose(entry: &str, search: Option<&str>, surface: Option<&str>) -> Result<String, ComposeError> {
-    compose_paths(program_paths(entry, search, surface).iter().map(String::as_str))
+    let replaced = if traces_solids(entry) { SOLID_HEIGHTS } else { &[] };
+    stitch(program_paths(entry, search, surface).iter().map(String::as_str), replaced)
+}
+
+/// Whether an entry finds out for itself what it sees, and traces rays through the shells of a scene.
+pub fn traces_solids(entry: &str) -> bool {
+    matches!(entry, "displaced" | "shell")
 }
 
 fn program_paths(entry: &str, search: Option<&str>, surface: Option<&str>) -> Vec<String> {
@@ -81,13 +96,10 @@ pub fn compose_with_horizon(
     surface: Option<&str>,
 ) -> Result<String, ComposeError> {
     let paths = program_paths(entry, search, surface);
-    stitch(paths.iter().map(String::as_str), &["shading/shadow_none.wgsl", "shading/shadow_search.wgsl"])
+    stitch(paths.iter().map(String::as_str), HORIZON_SHADOWS)
 }
 
-fn stitch<'a>(
-    paths: impl IntoIterator<Item = &'a str>,
-    replaced: &'static [&'static str],
-) -> Result<String, ComposeError> {
+fn stitch<'a>(paths: impl IntoIterator<Item = &'a str>, replaced: Replaced) -> Result<String, ComposeError> {
     let mut stitcher = Stitcher { included: Vec::new(), source: String::new(), replaced };
     for path in paths {
         stitcher.include(path, "the program")?;
@@ -98,13 +110,13 @@ fn stitch<'a>(
 struct Stitcher {
     included: Vec<String>,
     source: String,
-    /// Files for which [`HORIZON_SHADOWS`] stands in.
-    replaced: &'static [&'static str],
+    replaced: Replaced,
 }
 
 impl Stitcher {
     fn include(&mut self, path: &str, from: &str) -> Result<(), ComposeError> {
-        let path = if self.replaced.contains(&path) { HORIZON_SHADOWS } else { path };
+        let path =
+            self.replaced.iter().find(|(asked, _)| *asked == path).map_or(path, |(_, stand_in)| stand_in);
         if self.included.iter().any(|known| known == path) {
             return Ok(());
         }

@@ -18,6 +18,6 @@ pub mod compose;
 pub mod export;
 pub mod reflect;
 
-pub use compose::{ComposeError, compose, compose_paths, compose_with_horizon, files, read};
+pub use compose::{ComposeError, compose, compose_paths, compose_with_horizon, files, read, traces_solids};
 pub use export::{ExportError, Language, export_search};
 pub use reflect::{Field, Layout, ReflectError, layout_of, validate};

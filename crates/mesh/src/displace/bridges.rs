@@ -44,7 +44,8 @@ pub fn bridges(
             shares
         })
         .collect();
-    let count = |(&edge, shares): (&usize, &Vec<f64>)| (2 * seams.sides(edge).len() * (shares.len() - 1)) as u64;
+    let count =
+        |(&edge, shares): (&usize, &Vec<f64>)| (2 * seams.sides(edge).len() * (shares.len() - 1)) as u64;
     let got = parted.iter().zip(&shares).map(count).sum();
     if got > MAX_MICRO_TRIANGLES {
         let what = "micro-triangles along seams".to_owned();

@@ -57,6 +57,8 @@ pub struct Displaced {
     pub weights: Vec<Vec2>,
     /// Micro-triangles, wound as the triangles of the mesh.
     pub indices: Vec<[u32; 3]>,
+    /// The first vertex of strips along seams; they come last, and share no vertices with the rest.
+    pub first_strip: usize,
 }
 
 /// Which triangles are displaced, and how finely.
@@ -121,10 +123,10 @@ pub fn displace(mesh: &Mesh, cut: &Cut<'_>, relief: &Relief<'_>) -> Result<Displ
             displaced.indices.extend(pattern.triangles.iter().map(|t| t.map(|vertex| vertex + first)));
         }
     }
+    displaced.first_strip = displaced.positions.len();
     let meetings = seams.meetings(mesh, range, cut.origin, relief);
     for edge in seams.parted() {
-        let shares: Vec<f64> =
-            (0..=pieces[edge]).map(|k| f64::from(k) / f64::from(pieces[edge])).collect();
+        let shares: Vec<f64> = (0..=pieces[edge]).map(|k| f64::from(k) / f64::from(pieces[edge])).collect();
         displaced.bridge(&seams, mesh, edge, &shares, &meetings, cut.origin, relief, cut.keep);
     }
     Ok(displaced)

@@ -88,10 +88,11 @@ impl Seams {
                     sides.len() as u32 - 1
                 });
                 let known = &mut sides[number as usize];
-                let side = known.iter().position(|side| same_side(mesh, side.ends, ends)).unwrap_or_else(|| {
-                    known.push(Side { ends, face, corner, backwards });
-                    known.len() - 1
-                });
+                let side =
+                    known.iter().position(|side| same_side(mesh, side.ends, ends)).unwrap_or_else(|| {
+                        known.push(Side { ends, face, corner, backwards });
+                        known.len() - 1
+                    });
                 EdgeUse { edge: number, side: side as u32, backwards }
             }));
         }

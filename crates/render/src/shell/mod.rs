@@ -4,16 +4,29 @@
 //! normalised: its corners are straight lines, and the six of them bound it. Where the interpolated normal is
 //! shorter than 1 the prism reaches farther along it, so that unit normals stay inside.
 
+mod common;
 mod heights;
+mod scene;
+mod store;
+mod strips;
 mod tree;
 
+use std::ops::Range;
+use std::sync::Arc;
+
 use glam::{DVec3, Vec2, Vec3};
+use heightfield::HeightField;
+use mesh::Mesh;
 use rayon::prelude::*;
 
 use self::heights::HeightBounds;
 use self::tree::{Bounds, tree};
-use crate::uniforms::{ShellNode, ShellPrism};
-use crate::{Device, Draw, RenderError};
+use crate::RenderError;
+use crate::triangles::MeshArrays;
+use crate::uniforms::{PLAIN, PRISM, ShellNode, ShellPrism};
+
+pub(crate) use self::scene::SceneSolids;
+pub(crate) use self::store::Store;
 
 /// Shortest interpolated normal that is made up for: corners whose normals are 169 degrees apart.
 const SHORTEST_NORMAL: f32 = 0.1;
@@ -22,61 +35,99 @@ const MARGIN: f32 = 1e-3;
 /// Share of the mesh's size by which boxes are wider, so that rounding hides nothing.
 const WIDER: f32 = 4e-6;
 
-/// Bindings 3 and 4 of group 3, `shaders_wgsl/bindings/shell.wgsl`.
-pub(crate) struct Shell {
-    pub nodes: wgpu::Buffer,
-    pub prisms: wgpu::Buffer,
+/// Some triangles of a mesh in their relief, as rays meet them: prisms, strips between them, and a tree over both.
+/// Numbers count from its own first.
+pub(crate) struct Solid {
+    /// The mesh, all of it.
+    pub arrays: Arc<MeshArrays>,
+    pub nodes: Vec<ShellNode>,
+    pub prisms: Vec<ShellPrism>,
+    /// Three corners a triangle: bits of the place, and packed weights.
+    pub strips: Vec<[u32; 4]>,
     /// Corners of the box around everything, object space.
     pub bounds: [Vec3; 2],
 }
 
-impl Shell {
-    /// Builds and uploads the shell of a draw. `centre`: the middle of its mesh.
-    pub fn new(device: &Device, draw: &Draw<'_>, centre: DVec3) -> Result<Self, RenderError> {
-        let (nodes, prisms) = build(draw, centre);
-        let storage = wgpu::BufferUsages::STORAGE;
-        let bounds = nodes.first().map_or([Vec3::ZERO; 2], |root| [root.low.into(), root.high.into()]);
+impl Solid {
+    /// Builds the shell. `centre`: the middle of the mesh.
+    ///
+    /// # Errors
+    /// [`RenderError::Displacement`] for more strips along seams than memory is meant to hold.
+    pub fn new(
+        arrays: Arc<MeshArrays>,
+        mesh: &Mesh,
+        triangles: &Range<u32>,
+        field: &HeightField,
+        centre: DVec3,
+    ) -> Result<Self, RenderError> {
+        let mut made = if field.extent().scale > 0.0 {
+            prisms(mesh, triangles, field, centre)
+        } else {
+            bare(mesh, triangles, centre)
+        };
+        let strips = if field.extent().scale > 0.0 {
+            strips::strips(mesh, triangles, field, centre)?
+        } else {
+            Vec::new()
+        };
+        made.extend(strips.iter().enumerate().map(|(at, strip)| {
+            let prism = ShellPrism { face: strip.face, low: 0.0, high: 0.0, strip: at as u32 };
+            (prism, strip.places.iter().fold(Bounds::NONE, |around, &place| around.with(place)))
+        }));
+        let size = made.iter().map(|(_, b)| b.low.abs().max(b.high.abs()).max_element()).fold(0.0, f32::max);
+        let wider = Vec3::splat(size * WIDER + f32::MIN_POSITIVE);
+        let bounds: Vec<Bounds> =
+            made.iter().map(|(_, b)| Bounds { low: b.low - wider, high: b.high + wider }).collect();
+        let (nodes, order) = tree(&bounds);
         Ok(Self {
-            bounds,
-            nodes: device.buffer_with("shell nodes", bytemuck::cast_slice(&nodes), storage)?,
-            prisms: device.buffer_with("shell prisms", bytemuck::cast_slice(&prisms), storage)?,
+            arrays,
+            bounds: nodes.first().map_or([Vec3::ZERO; 2], |root| [root.low.into(), root.high.into()]),
+            nodes,
+            prisms: order.iter().map(|&at| made[at as usize].0).collect(),
+            strips: strips.iter().flat_map(strips::Strip::packed).collect(),
         })
     }
 }
 
-fn build(draw: &Draw<'_>, centre: DVec3) -> (Vec<ShellNode>, Vec<ShellPrism>) {
-    let (mesh, field) = (&*draw.mesh, &draw.material.field);
+/// The bare triangles.
+fn bare(mesh: &Mesh, triangles: &Range<u32>, centre: DVec3) -> Vec<(ShellPrism, Bounds)> {
+    let one = |face: u32| {
+        let around = mesh.indices[face as usize].iter().fold(Bounds::NONE, |around, &at| {
+            around.with((mesh.positions[at as usize].as_dvec3() - centre).as_vec3())
+        });
+        (ShellPrism { face, low: 0.0, high: 0.0, strip: PLAIN }, around)
+    };
+    triangles.clone().into_par_iter().map(one).collect()
+}
+
+/// A prism on each triangle.
+fn prisms(
+    mesh: &Mesh,
+    triangles: &Range<u32>,
+    field: &HeightField,
+    centre: DVec3,
+) -> Vec<(ShellPrism, Bounds)> {
     let extent = field.extent();
     let heights = HeightBounds::new(field);
-    let made: Vec<(ShellPrism, Bounds)> = draw
-        .triangles
-        .clone()
-        .into_par_iter()
-        .map(|face| {
-            let corners = mesh.indices[face as usize].map(|at| at as usize);
-            let normals = corners.map(|at| mesh.normals[at]);
-            let [low, high] = heights.over(corners.map(|at| mesh.uvs[at]));
-            let longest = 1.0 / nearest_to_origin(normals).max(SHORTEST_NORMAL);
-            let rise = |height: f32| {
-                let rise = extent.scale * (height - extent.base);
-                [rise, rise * longest]
-            };
-            let [a, b] = rise(low - MARGIN);
-            let [c, d] = rise(high + MARGIN);
-            let prism = ShellPrism { face, low: a.min(b), high: c.max(d), unused: 0 };
-            let around = corners.iter().fold(Bounds::NONE, |around, &at| {
-                let foot = (mesh.positions[at].as_dvec3() - centre).as_vec3();
-                around.with(foot + prism.low * mesh.normals[at]).with(foot + prism.high * mesh.normals[at])
-            });
-            (prism, around)
-        })
-        .collect();
-    let size = made.iter().map(|(_, b)| b.low.abs().max(b.high.abs()).max_element()).fold(0.0, f32::max);
-    let wider = Vec3::splat(size * WIDER + f32::MIN_POSITIVE);
-    let bounds: Vec<Bounds> =
-        made.iter().map(|(_, b)| Bounds { low: b.low - wider, high: b.high + wider }).collect();
-    let (nodes, order) = tree(&bounds);
-    (nodes, order.iter().map(|&at| made[at as usize].0).collect())
+    let one = |face: u32| {
+        let corners = mesh.indices[face as usize].map(|at| at as usize);
+        let normals = corners.map(|at| mesh.normals[at]);
+        let [low, high] = heights.over(corners.map(|at| mesh.uvs[at]));
+        let longest = 1.0 / nearest_to_origin(normals).max(SHORTEST_NORMAL);
+        let rise = |height: f32| {
+            let rise = extent.scale * (height - extent.base);
+            [rise, rise * longest]
+        };
+        let [a, b] = rise(low - MARGIN);
+        let [c, d] = rise(high + MARGIN);
+        let prism = ShellPrism { face, low: a.min(b), high: c.max(d), strip: PRISM };
+        let around = corners.iter().fold(Bounds::NONE, |around, &at| {
+            let foot = (mesh.positions[at].as_dvec3() - centre).as_vec3();
+            around.with(foot + prism.low * mesh.normals[at]).with(foot + prism.high * mesh.normals[at])
+        });
+        (prism, around)
+    };
+    triangles.clone().into_par_iter().map(one).collect()
 }
 
 /// Distance from the origin to a triangle.

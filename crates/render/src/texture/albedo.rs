@@ -18,8 +18,14 @@ pub fn srgb_from_linear(linear: f32) -> f32 {
     if linear <= 0.0031308 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
-static LINEAR_FROM_BYTE: LazyLock<[f32; 256]> =
+/// Linear light of each 8-bit sRGB value.
+pub(crate) static LINEAR_FROM_BYTE: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|byte| linear_from_srgb(byte as f32 / 255.0)));
+
+/// The 8-bit sRGB value of linear light.
+pub(crate) fn srgb_byte(linear: f32) -> u8 {
+    byte(srgb_from_linear(linear))
+}
 
 fn byte(value: f32) -> u8 {
     // NaN becomes 0.
@@ -63,9 +69,7 @@ pub(crate) fn albedo(image: &Image) -> Vec<MipLevel> {
         };
         let bytes = next
             .par_iter()
-            .flat_map_iter(|&[r, g, b, a]| {
-                [byte(srgb_from_linear(r)), byte(srgb_from_linear(g)), byte(srgb_from_linear(b)), byte(a)]
-            })
+            .flat_map_iter(|&[r, g, b, a]| [srgb_byte(r), srgb_byte(g), srgb_byte(b), byte(a)])
             .collect();
         levels.push(MipLevel { size: half, bytes });
         size = half;

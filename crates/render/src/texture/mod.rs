@@ -8,7 +8,7 @@ mod normals;
 mod slopes;
 mod upload;
 
-pub(crate) use albedo::{albedo, white};
+pub(crate) use albedo::{LINEAR_FROM_BYTE, albedo, srgb_byte, white};
 pub(crate) use cube::normalization_cube;
 pub(crate) use horizon::horizon;
 pub(crate) use normals::{baked_8_bit, own, own_8_bit};

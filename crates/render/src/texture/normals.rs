@@ -43,11 +43,16 @@ pub fn unit_normals(image: &Image) -> Vec<Vec3> {
         .collect()
 }
 
-/// All levels of the material's own map, 16-bit floats.
+/// All levels of the material's own map, 16-bit floats; the fourth is the length of the mean of unit normals, which
+/// tells how much they differ within a texel.
 pub(crate) fn own(image: &Image) -> Vec<MipLevel> {
-    chain([image.width, image.height], unit_normals(image), |normal| {
-        let stored = [normal.x, normal.y, normal.z, 1.0].map(|c| f16::from_f32(0.5 * c + 0.5).to_le_bytes());
-        bytemuck::cast::<_, [u8; 8]>(stored)
+    chain([image.width, image.height], unit_normals(image), |mean| {
+        let normal = mean.normalize_or(Vec3::Z);
+        let encoded = [normal.x, normal.y, normal.z].map(|c| 0.5 * c + 0.5);
+        let [x, y, z] = encoded;
+        bytemuck::cast::<_, [u8; 8]>(
+            [x, y, z, mean.length().min(1.0)].map(|c| f16::from_f32(c).to_le_bytes()),
+        )
     })
 }
 
@@ -63,21 +68,23 @@ pub(crate) fn baked_8_bit(field: &HeightField) -> Result<Vec<MipLevel>, RenderEr
     Ok(chain([field.width(), field.height()], normals, eight_bits))
 }
 
-fn eight_bits(normal: Vec3) -> [u8; 4] {
+fn eight_bits(mean: Vec3) -> [u8; 4] {
+    let normal = mean.normalize_or(Vec3::Z);
     let stored = |c: f32| ((0.5 * c + 0.5) * 255.0).round() as u8;
     [stored(normal.x), stored(normal.y), stored(normal.z), 255]
 }
 
+/// `encode` gets the means of the unit normals in a texel, which are shorter than 1 where those differ.
 fn chain<const B: usize>(
     mut size: [usize; 2],
     mut level: Vec<Vec3>,
     encode: impl Fn(Vec3) -> [u8; B] + Sync,
 ) -> Vec<MipLevel> {
-    let bytes = |level: &[Vec3]| level.par_iter().flat_map_iter(|normal| encode(*normal)).collect();
+    let bytes = |level: &[Vec3]| level.par_iter().flat_map_iter(|mean| encode(*mean)).collect();
     let mut levels = vec![MipLevel { size, bytes: bytes(&level) }];
     while size != [1, 1] {
         let (half, next) = halve(size, |x, y| level[y * size[0] + x].to_array());
-        let next: Vec<Vec3> = next.into_iter().map(|sum| Vec3::from(sum).normalize_or(Vec3::Z)).collect();
+        let next: Vec<Vec3> = next.into_iter().map(Vec3::from).collect();
         levels.push(MipLevel { size: half, bytes: bytes(&next) });
         size = half;
         level = next;

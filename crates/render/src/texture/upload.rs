@@ -61,7 +61,11 @@ pub(crate) fn upload(
     })
 }
 
-/// A sampler that goes on beyond the edge as the height map does. `linear`: filtered, also between levels.
+/// Most samples along the longer axis of what a pixel covers of a map.
+const ANISOTROPY: u16 = 16;
+
+/// A sampler that goes on beyond the edge as the height map does. `linear`: filtered, also between levels and, where
+/// the view is flat, along what a pixel covers.
 pub(crate) fn sampler(device: &Device, wrap: Wrap, linear: bool) -> wgpu::Sampler {
     let address = match wrap {
         Wrap::Repeat => wgpu::AddressMode::Repeat,
@@ -76,6 +80,7 @@ pub(crate) fn sampler(device: &Device, wrap: Wrap, linear: bool) -> wgpu::Sample
         address_mode_w: address,
         mag_filter: filter,
         min_filter: filter,
+        anisotropy_clamp: if linear { ANISOTROPY } else { 1 },
         mipmap_filter: if linear { wgpu::MipmapFilterMode::Linear } else { wgpu::MipmapFilterMode::Nearest },
         ..Default::default()
     })

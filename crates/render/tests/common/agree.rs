@@ -4,10 +4,10 @@
 use glam::{DVec3, Vec2, Vec3};
 use render::{Camera, Frame};
 
-use super::truth::Hit;
+use super::truth::{Hit, Truth};
 
 /// Differences between a picture and the truth.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Agreement {
     /// Pixels covered in both.
     pub both: usize,
@@ -16,6 +16,8 @@ pub struct Agreement {
     pub outline_off: usize,
     /// Distance between the places, in pixels where they are, ninety-ninth percentile, away from edges in depth.
     pub place_p99: f64,
+    /// Pixels covered in both whose depth lies beyond all those of the truth within a pixel around.
+    pub astray: Vec<usize>,
     /// Share of pixels more than a pixel off, of all that are covered in both, edges in depth included.
     pub far: f64,
     /// Distance between the texture coordinates in texels, ninety-ninth percentile, away from edges in depth.
@@ -47,8 +49,15 @@ pub fn agreement(frame: &Frame, truth: &[Option<Hit>], camera: &Camera, texels: 
         })
     };
     let depth_of = |hit: &Hit| (hit.position - camera.eye).dot(camera.forward());
-    let mut found =
-        Agreement { both: 0, outline_off: 0, place_p99: 0.0, far: 0.0, texels_p99: 0.0, depth_p99: 0.0 };
+    let mut found = Agreement {
+        both: 0,
+        outline_off: 0,
+        place_p99: 0.0,
+        astray: Vec::new(),
+        far: 0.0,
+        texels_p99: 0.0,
+        depth_p99: 0.0,
+    };
     let (mut places, mut texel_errors, mut depth_errors, mut far) = (Vec::new(), Vec::new(), Vec::new(), 0);
     for at in 0..w * h {
         let (seen, hit) = (mask[at] == 1, &truth[at]);
@@ -61,6 +70,12 @@ pub fn agreement(frame: &Frame, truth: &[Option<Hit>], camera: &Camera, texels: 
         let place = Vec3::from_slice(&positions[3 * at..]).as_dvec3();
         let off = (place - hit.position).length() / (depth * pixel);
         far += usize::from(off > 1.0);
+        let near = || around(at).filter_map(|near| truth[near].as_ref()).map(depth_of);
+        let (nearest, farthest) = (near().fold(f64::INFINITY, f64::min), near().fold(0.0, f64::max));
+        let seen_depth = f64::from(depths[at]);
+        if seen_depth < nearest - depth * pixel || seen_depth > farthest + depth * pixel {
+            found.astray.push(at);
+        }
         let smooth = around(at).all(|near| {
             truth[near].is_some_and(|near| (depth_of(&near) - depth).abs() < 6.0 * depth * pixel)
         });
@@ -94,9 +109,10 @@ pub fn as_truth(frame: &Frame, camera: &Camera) -> Vec<Option<Hit>> {
 
 /// A line of a table.
 pub fn row(name: &str, base: f32, found: &Agreement) {
-    let Agreement { both, outline_off, place_p99, far, texels_p99, depth_p99 } = found;
+    let Agreement { both, outline_off, place_p99, astray, far, texels_p99, depth_p99 } = found;
+    let astray = astray.len();
     println!(
-        "| {name} | {base} | {both} | {outline_off} | {place_p99:.3} | {:.2} % | {texels_p99:.3} | {depth_p99:.1e} |",
+        "| {name} | {base} | {both} | {outline_off} | {astray} | {place_p99:.3} | {:.2} % | {texels_p99:.3} | {depth_p99:.1e} |",
         100.0 * far
     );
 }
@@ -112,4 +128,38 @@ pub fn show(frame: &Frame, name: &str) {
 /// A camera that looks at the origin.
 pub fn from(eye: [f64; 3]) -> Camera {
     Camera::look_at(DVec3::from(eye), DVec3::ZERO)
+}
+
+/// Pixels that are shadowed unlike all their neighbours, and unlike the truth says. `wrong`: for each pixel whether it
+/// is.
+pub fn specks(shadow: &[f32], wrong: &[bool], size: [u32; 2]) -> usize {
+    let (w, h) = (size[0] as usize, size[1] as usize);
+    let inner = (1..h - 1).flat_map(|y| (1..w - 1).map(move |x| y * w + x));
+    inner
+        .filter(|&at| {
+            let dark = |at: usize| shadow[at] > 0.5;
+            let near = [at - w - 1, at - w, at - w + 1, at - 1, at + 1, at + w - 1, at + w, at + w + 1];
+            wrong[at] && near.iter().all(|&near| dark(near) != dark(at))
+        })
+        .count()
+}
+
+/// Of the pixels that are astray those that show what is nowhere within a pixel: some things are seen from one point of
+/// a pixel only, being thinner.
+pub fn lost(found: &Agreement, frame: &Frame, judge: &Truth<'_>, camera: &Camera) -> usize {
+    const RAYS: i32 = 24;
+    let size = [frame.width, frame.height];
+    let [corner, right, down] = camera.pixel_directions(size, 0);
+    let positions = frame.aovs.position.as_ref().unwrap();
+    let shown = |&&at: &&usize| {
+        let place = Vec3::from_slice(&positions[3 * at..]).as_dvec3();
+        let reach = 1.5 * right.length() * (place - camera.eye).dot(camera.forward());
+        let (x, y) = ((at % size[0] as usize) as f64 + 0.5, (at / size[0] as usize) as f64 + 0.5);
+        (-RAYS..=RAYS).flat_map(|i| (-RAYS..=RAYS).map(move |j| (i, j))).any(|(i, j)| {
+            let [dx, dy] = [i, j].map(|k| f64::from(k) / f64::from(RAYS));
+            let hit = judge.first_hit(camera.eye, corner + right * (x + dx) + down * (y + dy));
+            hit.is_some_and(|hit| hit.position.distance(place) < reach)
+        })
+    };
+    found.astray.iter().filter(|at| !shown(at)).count()
 }

@@ -2,6 +2,7 @@
 #![allow(dead_code, missing_docs)]
 
 pub mod agree;
+pub mod bridges;
 pub mod shapes;
 pub mod truth;
 

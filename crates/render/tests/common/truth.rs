@@ -2,7 +2,8 @@
 //!
 //! Knows nothing of tessellation in pixels nor of shells. Each triangle is cut into a tree of micro-triangles a
 //! quarter of a texel wide, with a box around each branch; what a ray meets there is polished by Newton's
-//! method on the surface itself, P + scale (h - base) N / |N|.
+//! method on the surface itself, P + scale (h - base) N / |N|. Where triangles along an edge differ in UVs or normals,
+//! strips close what lies between them (`bridges.rs`).
 #![allow(dead_code)]
 
 use glam::{DMat3, DVec2, DVec3};
@@ -11,9 +12,12 @@ use mesh::Mesh;
 use rayon::prelude::*;
 use render::Camera;
 
+use super::bridges::Bridges;
+
 pub struct Truth<'a> {
     field: &'a HeightField,
     faces: Vec<Face>,
+    bridges: Bridges,
 }
 
 /// Where a ray meets the surface first, from outside.
@@ -107,7 +111,7 @@ impl<'a> Truth<'a> {
                 face
             })
             .collect();
-        Self { field, faces }
+        Self { field, faces, bridges: Bridges::new(mesh, field) }
     }
 
     /// The nearest place where the ray comes down through the surface.
@@ -135,6 +139,11 @@ impl<'a> Truth<'a> {
                     nearest = Some(hit);
                 }
             }
+        }
+        let last = nearest.map_or(f64::INFINITY, |hit| hit.t);
+        if let Some((t, uv)) = self.bridges.first(origin, direction, from_either_side, last) {
+            let height = self.field.height_at(uv.x, uv.y);
+            nearest = Some(Hit { t, position: origin + direction * t, uv, height });
         }
         nearest
     }

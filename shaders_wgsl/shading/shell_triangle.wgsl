@@ -1,0 +1,61 @@
+// Rays against what is flat in a shell: strips along seams and hard edges, and meshes without relief.
+#import "lib/prism.wgsl"
+#import "shading/shell_ray.wgsl"
+#import "shading/shell_sides.wgsl"
+
+struct FlatTriangle {
+    places: array<vec3f, 3>,
+    weights: array<vec2f, 3>,
+}
+
+fn flat_triangle(prism: ShellPrism) -> FlatTriangle {
+    var flat: FlatTriangle;
+    if prism.strip == PLAIN {
+        flat.weights = array<vec2f, 3>(vec2f(0.0), vec2f(1.0, 0.0), vec2f(0.0, 1.0));
+        for (var i = 0u; i < 3u; i++) {
+            flat.places[i] = corner_of(prism.face, i).place.xyz;
+        }
+        return flat;
+    }
+    for (var i = 0u; i < 3u; i++) {
+        let corner = strips[solid.strips + 3u * prism.strip + i];
+        flat.places[i] = bitcast<vec3f>(corner.xyz);
+        flat.weights[i] = unpack2x16unorm(corner.w);
+    }
+    return flat;
+}
+
+// The hit on a triangle where it is nearer than `best`.
+fn through_triangle(ray: ShellRay, prism: ShellPrism, best: ShellHit) -> ShellHit {
+    let near_start = ray.starts_here && prism.face == ray.start.face;
+    let own = prism.strip == ray.start.strip || (prism.strip != PLAIN && ray.start.strip == ANY_STRIP);
+    if near_start && own {
+        return best;
+    }
+    let flat = flat_triangle(prism);
+    let a = ray.across * (flat.places[0] - ray.origin);
+    let b = ray.across * (flat.places[1] - ray.origin);
+    let c = ray.across * (flat.places[2] - ray.origin);
+    let shares = vec3f(cross_2d(b.xy, c.xy), cross_2d(c.xy, a.xy), cross_2d(a.xy, b.xy));
+    let sum = shares.x + shares.y + shares.z;
+    // Seen along the ray, its front turns clockwise.
+    let from_behind = sum > 0.0;
+    if sum == 0.0 || (from_behind && !(ray.for_shadow || sees_inside)) {
+        return best;
+    }
+    let w = shares / sum;
+    let t = dot(w, vec3f(a.z, b.z, c.z));
+    let least = select(ray.first, ray.rounding, ray.starts_here);
+    if min(w.x, min(w.y, w.z)) < -PRISM_SLACK || !(t > least && t < best.t) {
+        return best;
+    }
+    var hit = best;
+    hit.found = true;
+    hit.inside = from_behind;
+    hit.status = 0u;
+    hit.t = t;
+    hit.face = prism.face;
+    hit.strip = prism.strip;
+    hit.weights = w.x * flat.weights[0] + w.y * flat.weights[1] + w.z * flat.weights[2];
+    return hit;
+}
