@@ -61,8 +61,11 @@ pub(crate) fn upload(
     })
 }
 
-/// Most samples along the longer axis of what a pixel covers of a map.
-const ANISOTROPY: u16 = 16;
+/// Most samples along the longer axis of what a pixel covers of a map. Not for devices in software: Mesa goes through
+/// all texels of the ellipse that a pixel covers, which never ends where a footprint is next to infinite.
+fn anisotropy(device: &Device) -> u16 {
+    if device.info().kind == "software" { 1 } else { 16 }
+}
 
 /// A sampler that goes on beyond the edge as the height map does. `linear`: filtered, also between levels and, where
 /// the view is flat, along what a pixel covers.
@@ -80,7 +83,7 @@ pub(crate) fn sampler(device: &Device, wrap: Wrap, linear: bool) -> wgpu::Sample
         address_mode_w: address,
         mag_filter: filter,
         min_filter: filter,
-        anisotropy_clamp: if linear { ANISOTROPY } else { 1 },
+        anisotropy_clamp: if linear { anisotropy(device) } else { 1 },
         mipmap_filter: if linear { wgpu::MipmapFilterMode::Linear } else { wgpu::MipmapFilterMode::Nearest },
         ..Default::default()
     })

@@ -1,0 +1,80 @@
+"""Several samples a pixel, and highlights of reliefs seen from afar."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import bumpwgpu as bw
+
+pytestmark = pytest.mark.gpu
+
+
+def linear(color: np.ndarray) -> np.ndarray:
+    value = color[..., :3] / 255.0
+    return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+
+
+def averaged(picture: np.ndarray, side: int) -> np.ndarray:
+    h, w, c = picture.shape
+    return picture.reshape(h // side, side, w // side, side, c).mean((1, 3))
+
+
+STEPS = bw.HeightMap((np.indices((32, 32)).sum(0) // 4 % 2).astype(np.float32), scale=0.1)
+CAMERA = bw.Camera.look_at((0.4, -0.6, 1.1), (0, 0, 0), up=(0, 1, 0))
+
+
+@pytest.mark.parametrize(("technique", "silhouettes"), [("exact", True), ("relief", False)])
+@pytest.mark.parametrize("samples", [4, 16])
+def test_samples_are_averaged_in_linear_light(technique: str, silhouettes: bool, samples: int) -> None:
+    common = {"camera": CAMERA, "technique": technique, "silhouettes": silhouettes}
+    material = bw.Material(height=STEPS)
+    one = bw.render(bw.Mesh.quad(), material, size=32, aovs=("depth", "uv", "mask"), **common)
+    several = bw.render(
+        bw.Mesh.quad(), material, size=32, samples=samples, aovs=("depth", "uv", "mask"), **common
+    )
+    side = int(np.sqrt(samples))
+    fine = bw.render(bw.Mesh.quad(), material, size=32 * side, **common)
+    covered = averaged(fine.color[..., 3:] / 255.0, side)[..., 0] == 1
+    truth = averaged(linear(fine.color), side)
+    assert covered.sum() > 200
+    assert np.abs(linear(several.color) - truth)[covered].max() < 0.005
+    # Negative control: the edges inside the relief.
+    assert np.abs(linear(one.color) - truth)[covered].max() > 0.1
+    for name in ("depth", "uv", "mask"):
+        np.testing.assert_array_equal(one.aovs[name], several.aovs[name])
+
+
+def test_senseless_samples_are_refused() -> None:
+    for samples in (0, 2, 3, -1, True, "four", 4.5):
+        with pytest.raises(ValueError, match="samples must be 1, 4 or 16"):
+            bw.render(bw.Mesh.quad(), size=8, samples=samples)
+
+
+def glints(size: int, shift: float = 0.0, **options: object) -> np.ndarray:
+    heights = bw.HeightMap.procedural("fbm", 256, scale=0.02)
+    gloss = bw.Material(height=heights, albedo_factor=(0, 0, 0, 1), specular=1.0, shininess=100.0)
+    frame = bw.render(
+        bw.Mesh.quad(),
+        gloss,
+        camera=bw.Camera.look_at((0.1 + shift, -0.3, 2.4), (0.1 + shift, 0.0, 0), up=(0, 1, 0), fov_y=20.0),
+        lights=[bw.Light.directional((0.1, 0.3, -2.4), intensity=0.5)],
+        technique="normal",
+        size=size,
+        ambient=0.0,
+        **options,  # type: ignore[arg-type]
+    )
+    return linear(frame.color)
+
+
+def test_highlights_keep_their_light_from_afar() -> None:
+    """256 samples a pixel of the map's own texels are the truth; 16 texels a pixel are what is drawn."""
+    truth = averaged(glints(512, specular_aa=False), 16)
+    with_aa, without = glints(32), glints(32, specular_aa=False)
+    energy = truth.mean()
+    assert energy > 0.01
+    error = abs(with_aa.mean() / energy - 1)
+    plain = abs(without.mean() / energy - 1)
+    print(f"highlight energy off by {error:.1%}, without antialiasing {plain:.1%}")
+    assert error < 0.1
+    assert error < 0.5 * plain
