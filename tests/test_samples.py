@@ -53,7 +53,7 @@ def test_senseless_samples_are_refused() -> None:
 
 def glints(size: int, shift: float = 0.0, **options: object) -> np.ndarray:
     heights = bw.HeightMap.procedural("fbm", 256, scale=0.02)
-    gloss = bw.Material(height=heights, albedo_factor=(0, 0, 0, 1), specular=1.0, shininess=100.0)
+    gloss = bw.Material(height=heights, albedo=(0.0, 0.0, 0.0), specular=1.0, shininess=100.0)
     frame = bw.render(
         bw.Mesh.quad(),
         gloss,
