@@ -60,7 +60,8 @@ const PRISM: u32 = 0xffffffffu;
 const PLAIN: u32 = 0xfffffffeu;
 
 @group(3) @binding(1) var<storage, read> vertices: array<MeshVertex>;
-@group(3) @binding(2) var<storage, read> triangles: array<u32>;
+// Three vertices, and the sheet of surface that the triangle is part of.
+@group(3) @binding(2) var<storage, read> triangles: array<vec4u>;
 @group(3) @binding(3) var<storage, read> shell_nodes: array<ShellNode>;
 @group(3) @binding(4) var<storage, read> shell_prisms: array<ShellPrism>;
 // Three corners a triangle: the bits of its place, and the weights of the mesh triangle's second and third corner in
@@ -76,5 +77,10 @@ var<private> solid: Solid;
 
 // A corner of a triangle of the solid.
 fn corner_of(face: u32, corner: u32) -> MeshVertex {
-    return vertices[solid.vertices + triangles[solid.triangles + 3u * face + corner]];
+    return vertices[solid.vertices + triangles[solid.triangles + face][corner]];
+}
+
+// The sheet that a triangle of the solid is part of: without steps between its triangles.
+fn sheet_of(face: u32) -> u32 {
+    return triangles[solid.triangles + face].w;
 }

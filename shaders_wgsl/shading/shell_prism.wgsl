@@ -13,7 +13,7 @@
 // How far a chord may be from the curve, in texels and in heights.
 const SAG: vec2f = vec2f(0.02, 5e-4);
 const MAX_CHORDS: f32 = 48.0;
-// Light rays meet nothing on their first so many cells, unless they are below the surface at the end of them. Creases
+// Light rays meet nothing of the sheet they start on on their first so many cells, unless they are below the surface at the end of them. Creases
 // between cells are no part of what the texels stand for, and the shading, whose slopes are smooth, knows none.
 const CREASE: f32 = 1.0;
 // Deeper than this below the surface, a ray has not met it by rounding: it is on the other side.
@@ -43,6 +43,7 @@ fn through_prism(ray: ShellRay, shell_prism: ShellPrism, best: ShellHit) -> Shel
     // Over the triangle on which it starts a light ray is where its start's numbers say.
     let on_relief = ray.starts_here && ray.start.strip == PRISM;
     let own = on_relief && shell_prism.face == ray.start.face;
+    let own_sheet = on_relief && sheet_of(shell_prism.face) == sheet_of(ray.start.face);
     if !(span.leave.t > max(span.enter.t, ray.first)) || span.enter.t >= best.t {
         return result;
     }
@@ -88,7 +89,7 @@ fn through_prism(ray: ShellRay, shell_prism: ShellPrism, best: ShellHit) -> Shel
         let length_in_cells = max(length(delta.xy * size), 1e-30);
         // Share of the chord that is still next to the start.
         let done = here.t / max(there.t - here.t, 1e-30);
-        let beside = select(0.0, CREASE / length_in_cells - done, on_relief);
+        let beside = select(0.0, CREASE / length_in_cells - done, own_sheet);
         if chord == 0.0 && beside <= 0.0 {
             let gap = gap_above(home);
             inside = gap < -select(ROUNDED_BELOW, slack, ray.for_shadow);

@@ -24,6 +24,7 @@ pub mod material;
 mod mesh;
 mod normals;
 mod obj;
+mod sheets;
 
 pub use detail::{
     DetailMaps, DetailOptions, DetailReport, NormalSpace, SkyOptions, bake_detail, tangent_map,
@@ -33,3 +34,4 @@ pub use error::MeshError;
 pub use frame::{Derivatives, FrameMethod, Split, derivatives, normal_derivatives, tangents};
 pub use material::{ImageSource, MaterialSource};
 pub use mesh::{Mesh, Part};
+pub use sheets::sheets;

@@ -9,7 +9,8 @@ use crate::uniforms::MeshVertex;
 /// What a mesh adds to bindings 1 and 2 of group 3, `shaders_wgsl/bindings/solids.wgsl`.
 pub(crate) struct MeshArrays {
     pub vertices: Vec<MeshVertex>,
-    pub indices: Vec<[u32; 3]>,
+    /// Corners of each triangle, and the number of its sheet.
+    pub triangles: Vec<[u32; 4]>,
 }
 
 impl MeshArrays {
@@ -28,6 +29,7 @@ impl MeshArrays {
             }
         };
         let vertices = (0..mesh.positions.len()).into_par_iter().map(vertex).collect();
-        Self { vertices, indices: mesh.indices.clone() }
+        let numbered = mesh.indices.iter().zip(mesh::sheets(mesh));
+        Self { vertices, triangles: numbered.map(|(&[a, b, c], sheet)| [a, b, c, sheet]).collect() }
     }
 }

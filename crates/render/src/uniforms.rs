@@ -80,7 +80,7 @@ pub struct SolidInfo {
     pub strips: u32,
     /// First vertex.
     pub vertices: u32,
-    /// First corner of its triangles.
+    /// First triangle.
     pub triangles: u32,
     /// First corner height.
     pub corners: u32,

@@ -28,18 +28,18 @@ impl<'a, T: Pod> Run<'a, T> {
         Self { slices: Vec::new(), length: 0 }
     }
 
-    /// Appends a slice, once however often it comes; gives its first number, in parts of `unit` a number.
-    fn add(&mut self, slice: &'a [T], unit: usize) -> u32 {
+    /// Appends a slice, once however often it comes; gives its first number.
+    fn add(&mut self, slice: &'a [T]) -> u32 {
         let mut at = 0;
         for known in &self.slices {
             if std::ptr::eq(*known, slice) && !slice.is_empty() {
-                return (at * unit) as u32;
+                return at as u32;
             }
             at += known.len();
         }
         self.slices.push(slice);
         self.length += slice.len();
-        (at * unit) as u32
+        at as u32
     }
 
     fn upload(self, device: &Device, label: &'static str) -> Result<wgpu::Buffer, RenderError> {
@@ -76,7 +76,7 @@ impl Common {
     /// Uploads solids with their heights.
     pub fn new(device: &Device, solids: &[(Arc<Solid>, &HeightField)]) -> Result<Self, RenderError> {
         let mut vertices = Run::<MeshVertex>::new();
-        let mut triangles = Run::<[u32; 3]>::new();
+        let mut triangles = Run::<[u32; 4]>::new();
         let mut nodes = Run::<ShellNode>::new();
         let mut prisms = Run::<ShellPrism>::new();
         let mut strips = Run::<[u32; 4]>::new();
@@ -86,13 +86,13 @@ impl Common {
             let [low, high] = solid.bounds;
             infos.push(SolidInfo {
                 heights: height_info(field, true),
-                nodes: nodes.add(&solid.nodes, 1),
-                prisms: prisms.add(&solid.prisms, 1),
-                strips: strips.add(&solid.strips, 1),
-                vertices: vertices.add(&solid.arrays.vertices, 1),
-                triangles: triangles.add(&solid.arrays.indices, 3),
-                corners: heights.add(field.corners(), 1),
-                pyramid: heights.add(field.skip_pyramid().maxima(), 1),
+                nodes: nodes.add(&solid.nodes),
+                prisms: prisms.add(&solid.prisms),
+                strips: strips.add(&solid.strips),
+                vertices: vertices.add(&solid.arrays.vertices),
+                triangles: triangles.add(&solid.arrays.triangles),
+                corners: heights.add(field.corners()),
+                pyramid: heights.add(field.skip_pyramid().maxima()),
                 endless: u32::from(!field.is_periodic()),
                 period: heightfield::march::period(field.wrap()) as f32,
                 radius: low.abs().max(high.abs()).max_element(),
