@@ -58,9 +58,11 @@ const INNER_NODE: u32 = 0xffffffffu;
 // What stands on a triangle is no strip but a prism full of heights, or the bare triangle.
 const PRISM: u32 = 0xffffffffu;
 const PLAIN: u32 = 0xfffffffeu;
+// Where the bits of the edges begin.
+const GOES_ON: u32 = 29u;
 
 @group(3) @binding(1) var<storage, read> vertices: array<MeshVertex>;
-// Three vertices, and the sheet of surface that the triangle is part of.
+// Three vertices; the sheet of surface that the triangle is part of, and a bit for each edge beyond which it goes on.
 @group(3) @binding(2) var<storage, read> triangles: array<vec4u>;
 @group(3) @binding(3) var<storage, read> shell_nodes: array<ShellNode>;
 @group(3) @binding(4) var<storage, read> shell_prisms: array<ShellPrism>;
@@ -80,7 +82,12 @@ fn corner_of(face: u32, corner: u32) -> MeshVertex {
     return vertices[solid.vertices + triangles[solid.triangles + face][corner]];
 }
 
-// The sheet that a triangle of the solid is part of: without steps between its triangles.
+// The sheet that a triangle of the solid is part of: torn only along its borders.
 fn sheet_of(face: u32) -> u32 {
-    return triangles[solid.triangles + face].w;
+    return triangles[solid.triangles + face].w & ((1u << GOES_ON) - 1u);
+}
+
+// Whether the sheet goes on beyond an edge of the triangle: 0 for that between its first two corners.
+fn goes_on(face: u32, edge: u32) -> bool {
+    return (triangles[solid.triangles + face].w >> (GOES_ON + edge) & 1u) == 1u;
 }

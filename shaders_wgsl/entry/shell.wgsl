@@ -36,9 +36,11 @@ fn fragment(in: Varyings) -> ReliefTargets {
     let normal = world_normal(shading_normal(point));
     let albedo = albedo_at(point.uv, point.uv_dx, point.uv_dy);
     let place = vec3f(point.uv, point.height);
-    var on_surface = position;
+    var on_surface: vec3f;
     if hit.strip == PRISM {
         on_surface = displaced_position(hit.face, hit.weights, point.height);
+    } else {
+        on_surface = on_flat(hit, position);
     }
     let start = ShellStart(hit.face, hit.strip, hit.weights, point.height);
     let light = lit(albedo.rgb, relative, normal, ShadowPoint(point.surface, place, on_surface, start));

@@ -10,6 +10,9 @@
 // Share of an edge by which rounding may put a crossing beyond its end.
 const PRISM_SLACK: f32 = 1e-5;
 
+// Lids and floors, where edges are numbered.
+const CAP: u32 = 3u;
+
 // x, y: across the ray; z: along it, from its origin.
 struct Prism {
     p0: vec3f,
@@ -29,16 +32,19 @@ struct PrismPoint {
 struct PrismSpan {
     enter: PrismPoint,
     leave: PrismPoint,
+    through: u32,          // where it enters: number of an edge, or CAP
 }
 
 fn cross_2d(a: vec2f, b: vec2f) -> f32 {
     return a.x * b.y - a.y * b.x;
 }
 
-fn widened(span: PrismSpan, point: PrismPoint) -> PrismSpan {
+// through: the edge or cap crossed.
+fn widened(span: PrismSpan, point: PrismPoint, through: u32) -> PrismSpan {
     var wider = span;
     if point.t < span.enter.t {
         wider.enter = point;
+        wider.through = through;
     }
     if point.t > span.leave.t {
         wider.leave = point;
@@ -60,13 +66,13 @@ fn cross_cap(prism: Prism, rise: f32, span: PrismSpan) -> PrismSpan {
     if min(w.x, min(w.y, w.z)) < -PRISM_SLACK {
         return span;
     }
-    return widened(span, PrismPoint(w.yz, rise, dot(w, vec3f(q0.z, q1.z, q2.z))));
+    return widened(span, PrismPoint(w.yz, rise, dot(w, vec3f(q0.z, q1.z, q2.z))), CAP);
 }
 
 // The crossing with the side over the edge from `a` to `b` at one rise. at_a, at_b: weights of its ends.
 fn cross_side_at(
     a: vec3f, b: vec3f, na: vec3f, nb: vec3f, at_a: vec2f, at_b: vec2f, rise: f32, low: f32, high: f32,
-    span: PrismSpan,
+    edge_number: u32, span: PrismSpan,
 ) -> PrismSpan {
     let qa = a + rise * na;
     let edge = b + rise * nb - qa;
@@ -76,11 +82,12 @@ fn cross_side_at(
     if !inside || square == 0.0 {
         return span;
     }
-    return widened(span, PrismPoint(mix(at_a, at_b, share), rise, qa.z + share * edge.z));
+    return widened(span, PrismPoint(mix(at_a, at_b, share), rise, qa.z + share * edge.z), edge_number);
 }
 
 fn cross_side(
-    a: vec3f, b: vec3f, na: vec3f, nb: vec3f, at_a: vec2f, at_b: vec2f, low: f32, high: f32, span: PrismSpan,
+    a: vec3f, b: vec3f, na: vec3f, nb: vec3f, at_a: vec2f, at_b: vec2f, low: f32, high: f32,
+    edge_number: u32, span: PrismSpan,
 ) -> PrismSpan {
     let constant = cross_2d(a.xy, b.xy);
     let slope = cross_2d(a.xy, nb.xy) + cross_2d(na.xy, b.xy);
@@ -92,10 +99,10 @@ fn cross_side(
     let q = -0.5 * (slope + select(-1.0, 1.0, slope >= 0.0) * sqrt(discriminant));
     var wider = span;
     if q != 0.0 {
-        wider = cross_side_at(a, b, na, nb, at_a, at_b, constant / q, low, high, wider);
+        wider = cross_side_at(a, b, na, nb, at_a, at_b, constant / q, low, high, edge_number, wider);
     }
     if bend != 0.0 {
-        wider = cross_side_at(a, b, na, nb, at_a, at_b, q / bend, low, high, wider);
+        wider = cross_side_at(a, b, na, nb, at_a, at_b, q / bend, low, high, edge_number, wider);
     }
     return wider;
 }
@@ -110,9 +117,9 @@ fn prism_span(prism: Prism, low: f32, high: f32) -> PrismSpan {
     let zero = vec2f(0.0, 0.0);
     let one = vec2f(1.0, 0.0);
     let two = vec2f(0.0, 1.0);
-    span = cross_side(prism.p0, prism.p1, prism.n0, prism.n1, zero, one, low, high, span);
-    span = cross_side(prism.p1, prism.p2, prism.n1, prism.n2, one, two, low, high, span);
-    return cross_side(prism.p2, prism.p0, prism.n2, prism.n0, two, zero, low, high, span);
+    span = cross_side(prism.p0, prism.p1, prism.n0, prism.n1, zero, one, low, high, 0u, span);
+    span = cross_side(prism.p1, prism.p2, prism.n1, prism.n2, one, two, low, high, 1u, span);
+    return cross_side(prism.p2, prism.p0, prism.n2, prism.n0, two, zero, low, high, 2u, span);
 }
 
 // The point of the prism at `t` of the ray, by Newton's method from a guess.

@@ -16,7 +16,8 @@ const MAX_CHORDS: f32 = 48.0;
 // Light rays meet nothing of the sheet they start on on their first so many cells, unless they are below the surface at the end of them. Creases
 // between cells are no part of what the texels stand for, and the shading, whose slopes are smooth, knows none.
 const CREASE: f32 = 1.0;
-// Deeper than this below the surface, a ray has not met it by rounding: it is on the other side.
+// So deep below the surface, in heights, a ray may come from the next triangle of a sheet without having met it there:
+// by as much chords are off. Deeper it is on the other side.
 const ROUNDED_BELOW: f32 = 2e-3;
 
 // Texture space coordinates of a point of a prism.
@@ -47,9 +48,13 @@ fn through_prism(ray: ShellRay, shell_prism: ShellPrism, best: ShellHit) -> Shel
     if !(span.leave.t > max(span.enter.t, ray.first)) || span.enter.t >= best.t {
         return result;
     }
+    // Not through a border of the sheet, where rays come in from outside above and below the surface.
+    var from_next = false;
     if own || span.enter.t < ray.first {
         let share = clamp((ray.first - span.enter.t) / (span.leave.t - span.enter.t), 0.0, 1.0);
         span.enter = prism_point(prism, ray.first, mix_points(span.enter, span.leave, share));
+    } else if span.through != CAP {
+        from_next = goes_on(shell_prism.face, span.through);
     }
     let uvs = mat3x2f(vec2f(a.place.w, a.up.w), vec2f(b.place.w, b.up.w), vec2f(c.place.w, c.up.w));
     let size = height_info.size;
@@ -92,8 +97,9 @@ fn through_prism(ray: ShellRay, shell_prism: ShellPrism, best: ShellHit) -> Shel
         let beside = select(0.0, CREASE / length_in_cells - done, own_sheet);
         if chord == 0.0 && beside <= 0.0 {
             let gap = gap_above(home);
-            inside = gap < -select(ROUNDED_BELOW, slack, ray.for_shadow);
-            from_surface = ray.for_shadow && abs(gap) <= slack;
+            let by_chords = from_next && !ray.for_shadow;
+            inside = gap < -select(slack, ROUNDED_BELOW, by_chords);
+            from_surface = !by_chords && abs(gap) <= slack;
         }
         if beside > 0.0 {
             skipped = min(beside, 1.0);

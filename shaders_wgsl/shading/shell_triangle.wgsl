@@ -8,21 +8,33 @@ struct FlatTriangle {
     weights: array<vec2f, 3>,
 }
 
-fn flat_triangle(prism: ShellPrism) -> FlatTriangle {
+// strip: number of a triangle of a strip, or PLAIN for that of the mesh.
+fn flat_triangle(face: u32, strip: u32) -> FlatTriangle {
     var flat: FlatTriangle;
-    if prism.strip == PLAIN {
+    if strip == PLAIN {
         flat.weights = array<vec2f, 3>(vec2f(0.0), vec2f(1.0, 0.0), vec2f(0.0, 1.0));
         for (var i = 0u; i < 3u; i++) {
-            flat.places[i] = corner_of(prism.face, i).place.xyz;
+            flat.places[i] = corner_of(face, i).place.xyz;
         }
         return flat;
     }
     for (var i = 0u; i < 3u; i++) {
-        let corner = strips[solid.strips + 3u * prism.strip + i];
+        let corner = strips[solid.strips + 3u * strip + i];
         flat.places[i] = bitcast<vec3f>(corner.xyz);
         flat.weights[i] = unpack2x16unorm(corner.w);
     }
     return flat;
+}
+
+fn across_flat(flat: FlatTriangle) -> vec3f {
+    return cross(flat.places[1] - flat.places[0], flat.places[2] - flat.places[0]);
+}
+
+// A point of the triangle that a hit is on: places found from far away may be off its plane.
+fn on_flat(hit: ShellHit, place: vec3f) -> vec3f {
+    let flat = flat_triangle(hit.face, hit.strip);
+    let normal = normalize_or(across_flat(flat), vec3f(0.0));
+    return place + dot(flat.places[0] - place, normal) * normal;
 }
 
 // The hit on a triangle where it is nearer than `best`.
@@ -32,7 +44,7 @@ fn through_triangle(ray: ShellRay, prism: ShellPrism, best: ShellHit) -> ShellHi
     if near_start && own {
         return best;
     }
-    let flat = flat_triangle(prism);
+    let flat = flat_triangle(prism.face, prism.strip);
     let a = ray.across * (flat.places[0] - ray.origin);
     let b = ray.across * (flat.places[1] - ray.origin);
     let c = ray.across * (flat.places[2] - ray.origin);
@@ -45,8 +57,11 @@ fn through_triangle(ray: ShellRay, prism: ShellPrism, best: ShellHit) -> ShellHi
     }
     let w = shares / sum;
     let t = dot(w, vec3f(a.z, b.z, c.z));
-    let least = select(ray.first, ray.rounding, ray.starts_here);
-    if min(w.x, min(w.y, w.z)) < -PRISM_SLACK || !(t > least && t < best.t) {
+    if min(w.x, min(w.y, w.z)) < -PRISM_SLACK || !(t > ray.first && t < best.t) {
+        return best;
+    }
+    // A start nearer to the triangle than rounding is on it: `sum` is the product of `along` and the normal.
+    if ray.starts_here && t * abs(sum) <= ray.rounding * length(across_flat(flat)) {
         return best;
     }
     var hit = best;

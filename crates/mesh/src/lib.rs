@@ -34,4 +34,4 @@ pub use error::MeshError;
 pub use frame::{Derivatives, FrameMethod, Split, derivatives, normal_derivatives, tangents};
 pub use material::{ImageSource, MaterialSource};
 pub use mesh::{Mesh, Part};
-pub use sheets::sheets;
+pub use sheets::{Sheets, sheets};

@@ -64,6 +64,8 @@ pub(crate) struct Shared {
     boxes: HashMap<u32, Geometry>,
     materials: HashMap<MaterialKey, wgpu::BindGroup>,
     place: wgpu::BindGroup,
+    /// Whether light rays are traced.
+    shadows: bool,
 }
 
 /// Where a mesh is in memory.
@@ -86,8 +88,8 @@ fn entry<K: Eq + std::hash::Hash, V: Clone>(
 }
 
 impl Shared {
-    /// Room for so many draws.
-    pub fn new(device: &Device, draws: usize) -> Result<Self, RenderError> {
+    /// Room for so many draws. `shadows`: whether light rays are traced.
+    pub fn new(device: &Device, draws: usize, shadows: bool) -> Result<Self, RenderError> {
         let alignment = u64::from(device.device.limits().min_storage_buffer_offset_alignment).max(16);
         let stride = (size_of::<DrawInfo>() as u64).next_multiple_of(alignment);
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
@@ -97,6 +99,7 @@ impl Shared {
             places,
             stride,
             place,
+            shadows,
             meshes: HashMap::new(),
             runs: HashMap::new(),
             boxes: HashMap::new(),
@@ -113,7 +116,6 @@ impl Shared {
         middle: DVec3,
         solids: Option<(&SceneSolids, u32)>,
         request: &Request,
-        shadows: bool,
         stats: &mut Stats,
     ) -> Result<Prepared, RenderError> {
         let mut program = request.technique.program(draw.material.normal.is_some());
@@ -122,6 +124,7 @@ impl Shared {
             && request.shadows != Some(false)
             && request.technique.takes_horizon();
         let reads = reads_of(&request.technique).filter(|_| solids.is_none());
+        let shadows = self.shadows;
         let key = |program| key(draw, request, program, reads, shadows);
 
         let field = reads.map(|reads| device.field_group(&draw.material.field, reads)).transpose()?;

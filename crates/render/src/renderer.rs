@@ -38,7 +38,6 @@ pub struct Renderer<'a> {
     device: Held<'a, Device>,
     scene: Scene<'a>,
     request: Request,
-    shadows: bool,
     rows_at_once: u32,
     rooms: HashMap<usize, Room>,
     shared: Shared,
@@ -133,13 +132,13 @@ impl<'a> Renderer<'a> {
             rooms.entry(address(&draw.mesh)).or_insert_with(|| Room::of(&draw.mesh));
         }
         let rows_at_once = (band_pixels / u64::from(width)).clamp(1, u64::from(height)) as u32;
+        let shadows = request.shadows.unwrap_or(true) && request.technique.casts_shadows();
         let mut renderer = Self {
-            shadows: request.shadows.unwrap_or(true) && request.technique.casts_shadows(),
             rooms,
             across,
             central,
             solids: None,
-            shared: Shared::new(&device, scene.draws.len())?,
+            shared: Shared::new(&device, scene.draws.len(), shadows)?,
             draws: scene.draws.iter().map(|_| None).collect(),
             targets: Targets::new(&device, TargetSet::of(request.aovs), width, rows_at_once)?,
             frame: FrameBinding::new(&device, &scene)?,
@@ -316,8 +315,9 @@ impl<'a> Renderer<'a> {
     }
 
     /// Builds the solids of the scene where rays are traced through them and places them for a view: all of them, since
-    /// what is outside the picture may throw a shadow into it. Gives each draw's number among the instances.
-    fn place_solids(&mut self, camera: &Camera) -> Result<Vec<u32>, RenderError> {
+    /// what is outside the picture may throw a shadow into it. Gives for each draw what
+    /// [`DrawInfo::own`] holds.
+    fn place_solids(&mut self, camera: &Camera) -> Result<Vec<[u32; 2]>, RenderError> {
         if !self.request.traces_solids() {
             return Ok(Vec::new());
         }
@@ -333,8 +333,10 @@ impl<'a> Renderer<'a> {
         };
         let relative: Vec<DMat4> = self.scene.draws.iter().zip(&middles).map(relative).collect();
         let numbers = solids.place(&self.device, &relative)?;
+        let own = |(at, number)| [number, solids.of_draw(at)];
+        let own = numbers.into_iter().enumerate().map(own).collect();
         self.solids = Some(solids);
-        Ok(numbers)
+        Ok(own)
     }
 
     /// What is drawn of a view, with its places and lights on the device.
@@ -365,14 +367,12 @@ impl<'a> Renderer<'a> {
             }
             let middle = self.rooms.get(&address(&draw.mesh)).map_or(glam::DVec3::ZERO, |room| room.middle);
             if self.draws[at].is_none() {
-                let (request, shadows) = (&self.request, self.shadows);
                 let solids = self.solids.as_ref().map(|solids| (solids, solids.of_draw(at)));
-                let made =
-                    self.shared.prepare(&self.device, draw, middle, solids, request, shadows, stats)?;
+                let made = self.shared.prepare(&self.device, draw, middle, solids, &self.request, stats)?;
                 self.draws[at] = Some(made);
             }
             let Some(prepared) = &self.draws[at] else { continue };
-            let own = self.solids.as_ref().map_or([0; 2], |solids| [numbers[at], solids.of_draw(at)]);
+            let own = numbers.get(at).copied().unwrap_or_default();
             if view.add(at, draw, middle, prepared, &stand, places.len() as u32, stats, warnings)? {
                 let place = DrawInfo::of(stand.relative_from_object, own);
                 places.extend_from_slice(bytemuck::bytes_of(&place));

@@ -6,10 +6,14 @@ use rayon::prelude::*;
 
 use crate::uniforms::MeshVertex;
 
+/// Twin of `GOES_ON` in `shaders_wgsl/bindings/solids.wgsl`. Numbers of vertices stay below: so many would take 48 GB.
+const GOES_ON: usize = 29;
+
 /// What a mesh adds to bindings 1 and 2 of group 3, `shaders_wgsl/bindings/solids.wgsl`.
 pub(crate) struct MeshArrays {
     pub vertices: Vec<MeshVertex>,
-    /// Corners of each triangle, and the number of its sheet.
+    /// Corners of each triangle; the number of its sheet, and from [`GOES_ON`] on a bit for each edge beyond which the
+    /// sheet goes on.
     pub triangles: Vec<[u32; 4]>,
 }
 
@@ -29,7 +33,12 @@ impl MeshArrays {
             }
         };
         let vertices = (0..mesh.positions.len()).into_par_iter().map(vertex).collect();
-        let numbered = mesh.indices.iter().zip(mesh::sheets(mesh));
-        Self { vertices, triangles: numbered.map(|(&[a, b, c], sheet)| [a, b, c, sheet]).collect() }
+        let sheets = mesh::sheets(mesh);
+        let triangle = |face: usize| {
+            let [a, b, c] = mesh.indices[face];
+            let edges = (0..3).map(|edge| u32::from(sheets.goes_on[face][edge]) << (GOES_ON + edge));
+            [a, b, c, edges.fold(sheets.of[face], |sum, bit| sum | bit)]
+        };
+        Self { vertices, triangles: (0..mesh.indices.len()).map(triangle).collect() }
     }
 }

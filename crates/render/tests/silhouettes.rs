@@ -7,21 +7,12 @@
 
 mod common;
 
-use common::agree::{agreement, as_truth, from, lost, row, show, specks};
-use common::shapes::{LIGHT, SIZE, heights, picture, scene_picture, shapes};
+use common::agree::{agreement, as_truth, from, row, show};
+use common::shapes::{SIZE, heights, picture, scene_picture, shapes};
 use common::truth::Truth;
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use mesh::Mesh;
 use render::{Camera, Draw, Material};
-
-/// About the width of a texel on the shapes.
-const TEXEL: f64 = 0.025;
-
-/// Pixels that are known to show what is not there: one on the carved cube, at the rim of a fin, where a strip between
-/// two sides is seen from its edge.
-fn known_faults(name: &str, base: f32) -> usize {
-    usize::from(name == "cube" && base == 1.0)
-}
 
 #[test]
 fn relief_in_the_shell_is_the_displaced_surface() {
@@ -42,36 +33,9 @@ fn relief_in_the_shell_is_the_displaced_surface() {
             row(name, base, &found);
             assert!(found.both > 1500 && found.outline_off == 0, "{name} {base}: {found:?}");
             assert!(found.place_p99 < 0.06 && found.texels_p99 < 0.04, "{name} {base}: {found:?}");
-            let (lost, known) = (lost(&found, &frame, &judge, &camera), known_faults(name, base));
-            assert!(lost <= known, "{name} {base}: {lost} lost, {found:?}");
-            assert!(
-                found.astray.len() * 1000 < found.both && found.depth_p99 < 4e-4,
-                "{name} {base}: {found:?}"
-            );
-            assert!(found.far < 0.001 + known as f64 / found.both as f64, "{name} {base}: {found:?}");
+            assert!(found.astray.is_empty() && found.depth_p99 < 4e-4, "{name} {base}: {found:?}");
+            assert!(found.far < 0.001, "{name} {base}: {found:?}");
             assert_eq!(frame.stats.pixels_unconverged, 0);
-
-            // Shadows, away from where the light only grazes.
-            let (shadow, normals) = (frame.aovs.shadow.unwrap(), frame.aovs.normal.unwrap());
-            let to_light = -LIGHT.as_dvec3().normalize();
-            let (mut seen, mut dark) = (0, 0);
-            let mut wrong = vec![false; truth.len()];
-            for (at, hit) in truth.iter().enumerate() {
-                let normal = Vec3::from_slice(&normals[3 * at..]).as_dvec3();
-                let (Some(hit), true) = (hit, normal.dot(to_light) > 0.1) else { continue };
-                // What is in the way within a texel may be a crease of the bilinear surface.
-                let [blocked, farther] =
-                    [1e-5, TEXEL].map(|clear| judge.blocked(hit.position, to_light, clear));
-                seen += 1;
-                dark += usize::from(blocked);
-                wrong[at] = blocked == farther && blocked != (shadow[at] > 0.5);
-            }
-            let count = wrong.iter().filter(|wrong| **wrong).count();
-            let specks = specks(&shadow, &wrong, SIZE);
-            println!(
-                "{name} {base}: {dark} of {seen} pixels in shadow, {count} wrong, {specks} of them alone"
-            );
-            assert!(seen > 1500 && count * 200 < seen && specks == 0, "{name} {base}: {count} of {seen}");
         }
     }
 }
@@ -102,9 +66,7 @@ fn outlines_are_those_of_displacement() {
             let found = agreement(&traced, &as_truth(&displaced, &camera), &camera, texels);
             row(name, base, &found);
             assert!(found.both > 1500 && found.outline_off == 0, "{name} {base}: {found:?}");
-            let lost = lost(&found, &traced, &Truth::new(&mesh, &field), &camera);
-            assert!(found.place_p99 < 0.5, "{name} {base}: {found:?}");
-            assert!(lost <= known_faults(name, base), "{name} {base}: {lost} lost, {found:?}");
+            assert!(found.place_p99 < 0.5 && found.astray.is_empty(), "{name} {base}: {found:?}");
         }
     }
 }

@@ -40,10 +40,11 @@ fn cuts(side: &EdgeSide, field: &HeightField) -> Vec<f64> {
     for axis in 0..2 {
         let [a, b] = [from[axis], to[axis]].map(|uv| uv * texels[axis] - 0.5);
         let (low, high) = (a.min(b).ceil(), a.max(b).floor());
-        if !(high - low < MOST_CELLS) {
+        let crossed = high - low;
+        if !crossed.is_finite() || crossed >= MOST_CELLS {
             return (1..1024).map(|k| f64::from(k) / 1024.0).collect();
         }
-        let count = (high - low + 1.0).max(0.0) as u32;
+        let count = (crossed + 1.0).max(0.0) as u32;
         crossings.extend((0..count).map(|k| (low + f64::from(k) - a) / (b - a)).filter(|s| s.is_finite()));
     }
     crossings.sort_by(f64::total_cmp);

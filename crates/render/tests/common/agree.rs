@@ -130,20 +130,6 @@ pub fn from(eye: [f64; 3]) -> Camera {
     Camera::look_at(DVec3::from(eye), DVec3::ZERO)
 }
 
-/// Pixels that are shadowed unlike all their neighbours, and unlike the truth says. `wrong`: for each pixel whether it
-/// is.
-pub fn specks(shadow: &[f32], wrong: &[bool], size: [u32; 2]) -> usize {
-    let (w, h) = (size[0] as usize, size[1] as usize);
-    let inner = (1..h - 1).flat_map(|y| (1..w - 1).map(move |x| y * w + x));
-    inner
-        .filter(|&at| {
-            let dark = |at: usize| shadow[at] > 0.5;
-            let near = [at - w - 1, at - w, at - w + 1, at - 1, at + 1, at + w - 1, at + w, at + w + 1];
-            wrong[at] && near.iter().all(|&near| dark(near) != dark(at))
-        })
-        .count()
-}
-
 /// Of the pixels that are astray those that show what is nowhere within a pixel: some things are seen from one point of
 /// a pixel only, being thinner.
 pub fn lost(found: &Agreement, frame: &Frame, judge: &Truth<'_>, camera: &Camera) -> usize {

@@ -15,11 +15,15 @@ const PIECES: f64 = 4.0;
 type Place = [u32; 3];
 /// UV and normal.
 type Seen = (DVec2, DVec3);
+/// Places and UVs of its corners.
+type Triangle = ([DVec3; 3], [DVec2; 3]);
+/// How the sides of an edge see its ends, and which of them run along it backwards.
+type Sides = (Vec<[Seen; 2]>, Vec<bool>);
 
 #[derive(Default)]
 pub struct Bridges {
     /// Triangles of one strip with the box around them.
-    strips: Vec<([DVec3; 2], Vec<([DVec3; 3], [DVec2; 3])>)>,
+    strips: Vec<([DVec3; 2], Vec<Triangle>)>,
 }
 
 fn meeting(field: &HeightField, position: DVec3, seen: &[Seen]) -> DVec3 {
@@ -43,7 +47,7 @@ impl Bridges {
         let place = |at: u32| -> Place { (mesh.positions[at as usize] + 0.0).to_array().map(f32::to_bits) };
         let seen = |at: u32| (mesh.uvs[at as usize].as_dvec2(), mesh.normals[at as usize].as_dvec3());
         let mut around: HashMap<Place, Vec<Seen>> = HashMap::new();
-        let mut edges: HashMap<[Place; 2], (Vec<[Seen; 2]>, Vec<bool>)> = HashMap::new();
+        let mut edges: HashMap<[Place; 2], Sides> = HashMap::new();
         for triangle in &mesh.indices {
             for k in 0..3 {
                 let (mut a, mut b) = (triangle[k], triangle[(k + 1) % 3]);

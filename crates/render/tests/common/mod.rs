@@ -3,6 +3,7 @@
 
 pub mod agree;
 pub mod bridges;
+pub mod light;
 pub mod shapes;
 pub mod truth;
 

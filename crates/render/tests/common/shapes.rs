@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::Vec3;
 use heightfield::{Extent, HeightField, Wrap};
 use mesh::Mesh;
-use render::{AovSet, Camera, Draw, Frame, Light, Material, Request, Scene, TechniqueChoice};
+use render::{AovSet, Camera, Draw, Frame, Material, Request, Scene, TechniqueChoice};
 
 use super::{field, sun};
 
@@ -32,12 +32,10 @@ pub fn shapes() -> [(&'static str, Mesh, [usize; 2], [f64; 3]); 4] {
     ]
 }
 
-/// The sun of all pictures.
-pub fn light() -> Light {
-    sun(LIGHT)
-}
-
+/// Where the light of all pictures goes that are not asked for another.
 pub const LIGHT: Vec3 = Vec3::new(-0.5, -0.7, -0.6);
+/// Light that grazes: 12 degrees above the quad and two sides of the cube.
+pub const LOW_LIGHT: Vec3 = Vec3::new(-0.95, -0.25, -0.21);
 
 /// A picture with mask, position, depth, uv, height, normal and shadow.
 pub fn picture(
@@ -60,7 +58,19 @@ pub fn scene_picture(
     technique: &str,
     silhouettes: bool,
 ) -> Frame {
-    let scene = Scene { draws, camera, lights: vec![light()], ambient: [0.1; 3], background: [0.0; 4] };
+    picture_under(device, LIGHT, draws, camera, technique, silhouettes)
+}
+
+/// The same in light that goes in some direction.
+pub fn picture_under(
+    device: &render::Device,
+    light: Vec3,
+    draws: Vec<Draw<'_>>,
+    camera: Camera,
+    technique: &str,
+    silhouettes: bool,
+) -> Frame {
+    let scene = Scene { draws, camera, lights: vec![sun(light)], ambient: [0.1; 3], background: [0.0; 4] };
     let places = AovSet::UV | AovSet::POSITION | AovSet::MASK | AovSet::DEPTH | AovSet::HEIGHT;
     let aovs = places | AovSet::NORMAL | AovSet::SHADOW;
     let technique = TechniqueChoice::named(technique).unwrap();

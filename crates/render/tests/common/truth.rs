@@ -6,7 +6,7 @@
 //! strips close what lies between them (`bridges.rs`).
 #![allow(dead_code)]
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DMat2, DMat3, DVec2, DVec3};
 use heightfield::HeightField;
 use mesh::Mesh;
 use rayon::prelude::*;
@@ -47,6 +47,13 @@ fn children([a, b, c]: [Weights; 3]) -> [[Weights; 3]; 4] {
 
 fn mix<T: std::ops::Mul<f64, Output = T> + std::ops::Add<Output = T> + Copy>(v: &[T; 3], w: Weights) -> T {
     v[0] * w.x + v[1] * w.y + v[2] * w.z
+}
+
+/// How far along the second and third side of a micro-triangle.
+fn shares([a, b, c]: [Weights; 3], w: Weights) -> (f64, f64) {
+    let flat = |w: Weights| DVec2::new(w.y, w.z);
+    let shares = DMat2::from_cols(flat(b - a), flat(c - a)).inverse() * flat(w - a);
+    (shares.x, shares.y)
 }
 
 impl Face {
@@ -168,9 +175,13 @@ impl<'a> Truth<'a> {
         }
         let solved = DMat3::from_cols(b - a, c - a, -direction).inverse() * (origin - a);
         let (x, y) = (solved.x, solved.y);
-        if !(x >= -1e-9 && y >= -1e-9 && x + y <= 1.0 + 1e-9 && solved.z > 0.0) {
+        // What misses the flat triangle by little may still meet the surface over it.
+        let reach = (b - a).length().max((c - a).length()) / direction.length();
+        let within = |x: f64, y: f64, slack: f64| x >= -slack && y >= -slack && x + y <= 1.0 + slack;
+        if !(within(x, y, 0.25) && solved.z > -reach) {
             return None;
         }
+        let mut polished = true;
         let (mut w, mut t) =
             (corners[0] + (corners[1] - corners[0]) * x + (corners[2] - corners[0]) * y, solved.z);
         for _ in 0..6 {
@@ -188,12 +199,15 @@ impl<'a> Truth<'a> {
             let moved = DVec3::new(-step.x - step.y, step.x, step.y);
             // Across a crease it may swing: the micro-triangle's own answer is good enough there.
             if !step.is_finite() || moved.length() > (corners[1] - corners[0]).length() {
+                polished = false;
                 break;
             }
             w += moved;
             t += step.z;
         }
-        if t <= 0.0 {
+        let meets_flat = within(x, y, 1e-9) && solved.z > 0.0;
+        let (x, y) = shares(corners, w);
+        if !(meets_flat || polished && within(x, y, 1e-9)) || t <= 0.0 {
             return None;
         }
         let uv = face.uv(w);
