@@ -52,12 +52,12 @@ SIGNATURES = {
     "Light.point": "position color intensity",
     "Material": "height albedo normal * specular shininess normal_convention double_sided",
     "render": (
-        "mesh material * camera lights technique size shadows silhouettes samples specular_aa aovs skip device "
-        "ambient background"
+        "mesh material * camera lights technique size shadows silhouettes samples specular_aa aovs skip "
+        "device ambient background"
     ),
     "Renderer": (
-        "mesh material * camera lights technique size shadows silhouettes samples specular_aa aovs skip device "
-        "ambient background"
+        "mesh material * camera lights technique size shadows silhouettes samples specular_aa aovs skip "
+        "device ambient background"
     ),
     "Renderer.render": "self camera",
     "Renderer.render_many": "self cameras",

@@ -248,8 +248,8 @@ def render(
         shell. For ``technique="exact"``; on the others it has no effect, and a warning says so.
     samples : {1, 4, 16}, default 1
         Samples a pixel, in a square grid: each is searched and shaded for itself, so that edges inside a
-        relief are smooth too, and they are averaged in linear light. The ``aovs`` are those of one sample in the
-        middle of each pixel; counts in ``stats`` are of all samples.
+        relief are smooth too, and they are averaged in linear light. The ``aovs`` are those of one sample in
+        the middle of each pixel; counts in ``stats`` are of all samples.
     specular_aa : bool, default True
         Where a pixel holds many slopes of the relief, highlights are as wide as those spread them
         (Toksvig 2005), so that they neither vanish nor flicker. Close up it changes nothing.
