@@ -215,8 +215,13 @@ def test_small_faults_of_bakes_are_found() -> None:
         def dimmed(*arguments: Any, factor: float = factor, **options: Any) -> Any:
             return {"ao": bw.bake(*arguments, **options)["ao"] * factor}
 
-        found = checks(bw.stress([], maps=["ao"], frames=[], bake=dimmed, only="flat"))
-        assert found >= {"flat ground"}
+        assert checks(bw.stress([], maps=["ao"], frames=[], bake=dimmed, only="flat")) >= {"flat ground"}
+        # And on every other kind of relief, before a hemisphere in double precision.
+        for relief in ("spike", "checkerboard", "step", "extremes", "1 x N", "odd"):
+            found = bw.stress([], maps=["ao"], frames=[], bake=dimmed, only=relief)
+            missed = {row["case"] for row in found.rows if "scale 0.1" in row["case"]}
+            missed -= {row["case"] for row in found.failures if row["check"] == "hemisphere"}
+            assert not missed, missed
 
     def steeper(source: Any, *arguments: Any, **options: Any) -> Any:
         other = bw.HeightMap(source.array, scale=1.01 * source.scale, wrap=source.wrap)
@@ -224,6 +229,14 @@ def test_small_faults_of_bakes_are_found() -> None:
 
     for name in ("normal", "relief", "normal_xy"):
         assert any(check.startswith("formula") for check in checks(bake_only(name, steeper))), name
+
+    def leaning(*arguments: Any, **options: Any) -> Any:
+        bent = bw.bake(*arguments, **options)["bent_normal"] + np.float32([0.02, 0.0, 0.0])
+        return {"bent_normal": bent / np.linalg.norm(bent, axis=-1, keepdims=True)}
+
+    assert "hemisphere" in checks(bake_only("bent_normal", leaning))
+    assert bake_only("ao")
+    assert bake_only("bent_normal")
 
 
 def test_a_swapped_green_is_found() -> None:
@@ -338,6 +351,21 @@ def test_progress_is_told_and_can_stop_it() -> None:
 def test_senseless_settings_are_refused(arguments: dict[str, Any], error: type, says: str) -> None:
     with pytest.raises(error, match=says):
         bw.stress(**{"techniques": [], "maps": [], "frames": [], **arguments})
+
+
+def test_answers_that_hang_on_a_rounding_are_told_from_faults() -> None:
+    # At 89.99 degrees a step of interval is hundreds of texels long, and its bracket holds many hits.
+    for technique in ("interval", "steep"):
+        made = bw.stress(technique, maps=[], frames=[], rays=128, only="89.99")
+        assert made, str(made)
+
+    def leaning(height_map: Any, origins: Any, directions: Any, technique: Any, **options: Any) -> Any:
+        # Rays to the right see a relief moved by half a texel: a mirrored map is then another one.
+        moved = origins.copy()
+        moved[:, 0] += np.where(directions[:, 0] > 0.0, 0.5 / height_map.shape[1], 0.0)
+        return bw.march(height_map, moved, directions, technique, **options)
+
+    assert "mirrored" in checks(march_only(leaning, "interval"))
 
 
 @pytest.mark.slow

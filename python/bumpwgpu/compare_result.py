@@ -89,7 +89,7 @@ class CompareResult:
         ``technique``, ``parameters``, ``label``, ``elevation``, ``rays``; ``heights_format``,
         ``cones_format`` (None where none are read), ``memory_bytes`` (texture that it reads);
         ``time_cpu_ns_per_ray`` and ``time_device_ns_per_ray`` (median, with ``_low`` and ``_high``
-        quartiles; CPU on all cores; None where not measured);
+        quartiles; CPU on one core; None where not measured);
         ``uv_error_median_texels``, ``uv_error_p99_texels``, ``uv_error_p99_bound_texels`` (what the 99th
         percentile of all such rays does not exceed, with 95 % confidence; None for under 299 rays),
         ``uv_error_max_texels``, ``share_above_1_texel``; ``depth_error_p99``, ``depth_error_max``
@@ -179,8 +179,9 @@ class CompareResult:
         list of dict
             Rows by rising time, each with ``tied_with``: labels of settings whose time cannot be told from
             its own (the quartile ranges meet, or the medians are within 25 %) and that are on the front
-            too or would be, were the tie broken in their favour. On another machine they may come in its
-            place.
+            too or would be, were the tie broken in their favour; and ``certain``: whether it is on the front
+            however ties are broken. On another machine one that is not certain may make way for one that it
+            ties with.
 
         Raises
         ------
@@ -190,7 +191,10 @@ class CompareResult:
         rows, measured = self._measured(elevation, time)
         allowed = number("max_failure_rate", max_failure_rate, 0.0, 1.0)
         front = _bumpwgpu.compare_front(measured, allowed)
-        return [{**rows[at], "tied_with": [rows[other]["label"] for other in tied]} for at, tied in front]
+        return [
+            {**rows[at], "tied_with": [rows[other]["label"] for other in tied], "certain": certain}
+            for at, tied, certain in front
+        ]
 
     def recommend(
         self,
@@ -375,6 +379,7 @@ class CompareResult:
             "rows": self.rows,
             "dropped": self.dropped,
             "pareto": [row["label"] for row in front],
+            "certain": [row["label"] for row in front if row["certain"]],
             "ties": {row["label"]: row["tied_with"] for row in front if row["tied_with"]},
             "recommendation": advice_dict(advice),
         }

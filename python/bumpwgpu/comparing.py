@@ -61,7 +61,8 @@ def compare(
     rays : int, default 8192
         Rays at each elevation of a height map, at most 2**20.
     repeats : int, default 5
-        Timed repeats, taken in turns over all settings; medians and quartiles are reported.
+        Timed repeats, taken in turns over all settings; medians and quartiles are reported. What another
+        setting beats by far at every elevation is timed twice.
     seed : int, default 0
         Fixes rays and lights.
     progress : callable or None

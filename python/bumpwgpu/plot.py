@@ -43,7 +43,7 @@ def plot(result: CompareResult, path: str | os.PathLike[str]) -> Path:
         _draw_panel(axes, result, elevation, palette)
     for axes in list(grid.flat)[len(panels) :]:
         axes.set_axis_off()
-    where = "device" if result.timed_on == "device" else "CPU, all cores"
+    where = "device" if result.timed_on == "device" else "one CPU core"
     figure.suptitle(
         f"Time against error ({where}). Solid: settings worth having; dashed: if failing rays did not matter",
         fontsize=11,

@@ -67,7 +67,7 @@ _REGION_NAMES = {
 }
 
 _COLUMNS: tuple[Column, ...] = (
-    ("time_cpu_ns_per_ray", "CPU<br>ns", "Median time on the CPU, all cores", _time),
+    ("time_cpu_ns_per_ray", "CPU<br>ns", "Median time on one core of the CPU", _time),
     ("time_device_ns_per_ray", "device<br>ns", "Median time on the device", _time),
     ("uv_error_median_texels", "median<br>texels", "Median hit error", _number),
     ("uv_error_p99_texels", "p99<br>texels", "99th percentile of the hit error", _number),
@@ -176,7 +176,7 @@ def _advice(result: CompareResult) -> str:
         for row in result.pareto()
         if row["tied_with"]
     ]
-    where = "the device" if result.timed_on == "device" else "the CPU (all cores)"
+    where = "the device" if result.timed_on == "device" else "one core of the CPU"
     tied = f" Times that cannot be told apart: {'; '.join(ties)}." if ties else ""
     return f"<ul>{''.join(lines)}</ul><p class='note'>Ranked by time on {where}.{tied}</p>"
 

@@ -57,7 +57,7 @@ pub use moments::{covariance, half_vector_density, moments, toksvig_roughness};
 pub use normal::{Convention, normal_map, normal_xy};
 pub use occlusion::{ao_map, bent_normal_map};
 pub use progress::Progress;
-pub use provide::{provide, provide_for};
+pub use provide::{cone_ratios, provide, provide_for};
 pub use pyramid::{Level, pyramid};
 pub use relief::relief_map;
 pub use slopes::slopes;

@@ -32,12 +32,7 @@ pub fn provide(field: &HeightField, map: BakedMap, progress: Progress<'_>) -> Re
     }
     match map {
         BakedMap::Cone(kind) => {
-            let (recipe, mode) = recipe(kind);
-            let options = recipe.info.defaults().with("mode", Value::Choice(mode.to_owned()))?;
-            let baked = bake_cached(field, recipe, &options, progress)?;
-            for layer in baked.layers {
-                field.attach_cone_map(ConeMap::new(field, kind, &layer.texels)?);
-            }
+            field.attach_cone_map(ConeMap::new(field, kind, &cone_ratios(field, kind, progress)?)?);
         }
         BakedMap::Distance => {
             let recipe = &distance::DISTANCE;
@@ -48,6 +43,21 @@ pub fn provide(field: &HeightField, map: BakedMap, progress: Progress<'_>) -> Re
         }
     }
     Ok(())
+}
+
+/// Cone ratios, UV per unit height, as they are baked: row by row, not yet as a search stores them.
+///
+/// # Errors
+/// As [`provide`].
+pub fn cone_ratios(
+    field: &HeightField,
+    kind: ConeKind,
+    progress: Progress<'_>,
+) -> Result<Vec<f32>, BakeError> {
+    let (recipe, mode) = recipe(kind);
+    let options = recipe.info.defaults().with("mode", Value::Choice(mode.to_owned()))?;
+    let baked = bake_cached(field, recipe, &options, progress)?;
+    Ok(baked.layers.into_iter().flat_map(|layer| layer.texels).collect())
 }
 
 fn recipe(kind: ConeKind) -> (&'static Map, &'static str) {

@@ -194,6 +194,12 @@ fn beaten(looks: &[Row], at: usize) -> bool {
             return false;
         }
         let (error, least) = (row.metrics.uv_error_p99_texels, than.metrics.uv_error_p99_texels);
+        let technique = |row: &Row| row.setting.technique.info.name;
+        let alike = technique(row) == technique(than) && row.setting.is_plain() && than.setting.is_plain();
+        if alike && least.max(error) <= ERROR_FLOOR && work(than) < work(row) {
+            // Nothing is left to be gained by the steps that it takes more.
+            return true;
+        }
         let quicker = work(than) <= LESS_WORK * work(row);
         let sounder = than.metrics.failure_rate() <= fails.max(MOST_FAILING);
         if quicker && sounder && least <= (BETTER * error).max(ERROR_FLOOR) {

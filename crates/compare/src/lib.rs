@@ -8,6 +8,7 @@
 
 pub mod adaptive;
 pub mod cached;
+pub mod core_time;
 pub mod dive;
 pub mod error;
 pub mod judge;
@@ -18,6 +19,7 @@ pub mod rays;
 pub mod recommend;
 pub mod reference;
 pub mod region;
+pub mod rounds;
 pub mod run;
 pub mod setting;
 pub mod statistics;

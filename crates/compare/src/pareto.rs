@@ -84,6 +84,22 @@ pub fn front(candidates: &[Candidate]) -> Vec<usize> {
     front
 }
 
+/// Whether candidate `i` is on the front however ties in time are broken: whatever is no less accurate takes
+/// clearly longer, or was timed as one with it and is beaten by it already.
+pub fn is_certain(candidates: &[Candidate], i: usize) -> bool {
+    let own = &candidates[i];
+    let fit = |other: &Candidate| other.eligible && other.error.is_finite();
+    let rivals = |other: &Candidate| {
+        let as_accurate = other.ranked_error() <= own.ranked_error() * (1.0 + ERROR_SLACK);
+        as_accurate && other.time != own.time && !own.time.clearly_faster(&other.time)
+    };
+    fit(own)
+        && candidates
+            .iter()
+            .enumerate()
+            .all(|(j, other)| j == i || !fit(other) || !rivals(other) && !outclasses(other, own))
+}
+
 /// Those of `others` whose time cannot be told from that of candidate `i`.
 pub fn ties(candidates: &[Candidate], i: usize, others: &[usize]) -> Vec<usize> {
     let time = &candidates[i].time;
@@ -97,6 +113,7 @@ pub fn ties(candidates: &[Candidate], i: usize, others: &[usize]) -> Vec<usize> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::timing::LEAST_LEAD;
 
     fn candidate(time: f64, spread: f64, error: f64) -> Candidate {
         let time = Timing { median_ns: time, low_ns: time - spread, high_ns: time + spread };
@@ -165,7 +182,41 @@ mod tests {
             // Each contender that is off the front ties with a member of it.
             let tied = |i: &usize| front.contains(i) || !ties(&all, *i, &front).is_empty();
             assert!(near.iter().all(tied));
+            // Who ties with nobody is certain, and who is certain is on the front.
+            let alone = |i: &&usize| ties(&all, **i, &near).is_empty();
+            assert!(front.iter().filter(alone).all(|&i| is_certain(&all, i)));
+            assert!((0..all.len()).all(|i| !is_certain(&all, i) || front.contains(&i)));
         }
+    }
+
+    #[test]
+    fn who_is_certain_is_never_beaten_while_times_stay_within_the_tie() {
+        let mut random = crate::rays::Random::new(9, 10);
+        let mut counted = 0;
+        for _ in 0..500 {
+            let mut run = |all: &[Candidate], most: f64| -> Vec<Candidate> {
+                let moved = |one: &Candidate| {
+                    let factor = most.powf(random.unit() - 0.5);
+                    let Timing { median_ns, low_ns, high_ns } = one.time;
+                    let time = Timing {
+                        median_ns: median_ns * factor,
+                        low_ns: low_ns * factor,
+                        high_ns: high_ns * factor,
+                    };
+                    Candidate { time, ..*one }
+                };
+                all.iter().map(moved).collect()
+            };
+            let even: Vec<Candidate> = (0..12).map(|k| candidate(2.0, 0.02, f64::from(k % 7))).collect();
+            let here = run(&even, 6.0);
+            // Each quotient of two times moves by a tie's breadth at most.
+            let there = run(&here, LEAST_LEAD);
+            for i in (0..here.len()).filter(|&i| is_certain(&here, i)) {
+                counted += 1;
+                assert!(contenders(&there).contains(&i));
+            }
+        }
+        assert!(counted > 500, "{counted}");
     }
 
     #[test]

@@ -7,10 +7,10 @@ use rayon::prelude::*;
 
 use crate::cached::{Truths, truths};
 use crate::region::Region;
+use crate::rounds::Rounds;
 use crate::setting::Setting;
 use crate::statistics::percentile;
 use crate::stores::{Stores, device_march};
-use crate::timing::{least_of_passes, time_cpu};
 use crate::{CompareError, DeviceMarch, Metrics, RayErrors, Reference, Reported, Timing};
 
 /// Most rays at one elevation: errors of all rays are kept until the end, for percentiles.
@@ -28,7 +28,7 @@ pub struct Plan {
     pub elevations_deg: Vec<f64>,
     /// Rays at each elevation.
     pub rays: usize,
-    /// Timed repeats after one warm-up.
+    /// Timed repeats after one warm-up; fewer for settings that are beaten by far.
     pub repeats: usize,
     /// Fixes rays and lights.
     pub seed: u64,
@@ -47,7 +47,7 @@ pub struct Row {
     pub regions: Vec<(Region, Metrics)>,
     /// Bytes of texture that it reads.
     pub memory_bytes: usize,
-    /// Time a ray on the CPU, all cores.
+    /// Time a ray on one core of the CPU.
     pub cpu: Timing,
     /// Time a ray on the device, if there is one.
     pub device: Option<Timing>,
@@ -66,21 +66,23 @@ pub struct DeviceDifference {
 
 /// What is known of one setting at one elevation while the comparison runs.
 #[derive(Default)]
-struct Cell {
-    errors: RayErrors,
+pub(crate) struct Cell {
+    pub(crate) errors: RayErrors,
     device_uv: Vec<f32>,
     device_status: usize,
-    cpu_seconds: Vec<f64>,
-    device_seconds: Vec<f64>,
+    /// Rays of a pass on the CPU; 0 before the first.
+    pub(crate) pass_rays: usize,
+    /// Seconds for all rays, of each round.
+    pub(crate) cpu_seconds: Vec<f64>,
+    pub(crate) device_seconds: Vec<f64>,
 }
 
 /// Compares all settings at all elevations.
 ///
-/// The reference is found once for each elevation, and kept for the next comparison. Times are taken in
-/// turns - repeat by repeat over all settings, every other time backwards - so that a machine that slows
-/// down is fair to all; each is the least of a few passes. The formats of maps are measured for what they
-/// do to errors; on the CPU all are marched as 32-bit floats, so that a setting that differs from another in
-/// its formats alone takes over the other's times.
+/// The reference is found once for each elevation, and kept for the next comparison. Times are taken in turns
+/// (see [`crate::rounds`]). The formats of maps are measured for what they do to errors; on the CPU all are
+/// marched as 32-bit floats, so that a setting that differs from another in its formats alone takes over the
+/// other's times.
 ///
 /// Rows come setting by setting: one for each elevation, then one for all of them together.
 ///
@@ -130,27 +132,7 @@ pub(crate) fn compare_stored(
         }
         sets.push(set);
     }
-    for repeat in 1..=plan.repeats {
-        for (at, set) in sets.iter().enumerate() {
-            let text = |setting: &Setting| format!("timing {setting}, round {repeat} of {}", plan.repeats);
-            let mut order = own.clone();
-            if repeat % 2 == 0 {
-                order.reverse();
-            }
-            for which in order {
-                let setting = &plan.settings[which];
-                tell(&text(setting), 1)?;
-                let cell = &mut cells[which][at];
-                let field = stores.field(setting);
-                let seconds = least_of_passes(|| time_cpu(field, &setting.technique, &set.rays))?;
-                cell.cpu_seconds.push(seconds);
-                if let Some(device) = device {
-                    let pass = || Ok(device_march(device, stores, setting, &set.rays)?.1);
-                    cell.device_seconds.push(least_of_passes(pass)?);
-                }
-            }
-        }
-    }
+    Rounds { stores, plan, sets: &sets, own: &own, device }.take(&mut cells, &mut tell)?;
     tell("done", 0)?;
     for (which, &from) in timed.iter().enumerate().filter(|(which, from)| which != *from) {
         let times: Vec<_> =
@@ -230,7 +212,7 @@ impl Plan {
 }
 
 /// Errors of one setting on one set of rays; also warms CPU and device up for the timing.
-fn measure(
+pub(crate) fn measure(
     stores: &Stores<'_>,
     setting: &Setting,
     set: &Truths,

@@ -1,6 +1,6 @@
 //! The height field as each format stores it, with the maps that techniques read.
 
-use bake::{ConeMode, Progress};
+use bake::Progress;
 use heightfield::{BakedMap, ConeKind, ConeMap, HeightField};
 
 use crate::setting::{Format, Setting};
@@ -75,13 +75,7 @@ impl<'a> Stores<'a> {
             Some(at) => at,
             None => {
                 let field = self.field(setting);
-                let progress = Progress::new(progress);
-                let ratios = match kind {
-                    ConeKind::Cone => bake::cone_map(field, ConeMode::Conservative, progress),
-                    ConeKind::ConeTexel => bake::cone_map(field, ConeMode::Texel, progress),
-                    ConeKind::RelaxedCone => bake::relaxed_cone_map(field, ConeMode::Conservative, progress),
-                    ConeKind::RelaxedConeTexel => bake::relaxed_cone_map(field, ConeMode::Texel, progress),
-                }?;
+                let ratios = bake::cone_ratios(field, kind, Progress::new(progress))?;
                 self.ratios.push((setting.heights, kind, ratios));
                 self.ratios.len() - 1
             }
@@ -113,6 +107,7 @@ pub(crate) fn device_march(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bake::ConeMode;
     use heightfield::{Technique, Wrap};
 
     #[test]

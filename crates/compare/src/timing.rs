@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use heightfield::{HeightField, Hits, MarchOptions, OutputSet, RayArray, Technique, march};
 
+use crate::core_time::Core;
 use crate::{CompareError, Rays};
 
 /// A device that can march, such as a GPU.
@@ -22,8 +23,8 @@ pub const LEAST_LEAD: f64 = 1.25;
 /// One sample of a time is the least of passes, of which there are this many at least and at most. What else a
 /// machine does only ever adds.
 const PASSES: (usize, usize) = (2, 8);
-/// No more passes begin when they would have taken this long at the least of them, seconds.
-const SAMPLE_SECONDS: f64 = 6e-3;
+/// No more passes begin after this long, seconds.
+const SAMPLE_SECONDS: f64 = 2e-3;
 
 /// Nanoseconds per ray over several repeats.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,9 +62,10 @@ impl Timing {
 /// # Errors
 /// That of the first pass that fails.
 pub fn least_of_passes(mut pass: impl FnMut() -> Result<f64, CompareError>) -> Result<f64, CompareError> {
+    let start = Instant::now();
     let mut least = pass()?;
     for done in 1..PASSES.1 {
-        if done >= PASSES.0 && done as f64 * least > SAMPLE_SECONDS {
+        if done >= PASSES.0 && start.elapsed().as_secs_f64() > SAMPLE_SECONDS {
             break;
         }
         least = least.min(pass()?);
@@ -71,18 +73,22 @@ pub fn least_of_passes(mut pass: impl FnMut() -> Result<f64, CompareError>) -> R
     Ok(least)
 }
 
-/// Seconds that the CPU, on all its cores, takes to find the hit positions of these rays.
+/// Seconds that one core takes to find the hit positions of the first `count` rays.
 ///
 /// # Errors
 /// Whatever [`march`] refuses.
-pub fn time_cpu(field: &HeightField, technique: &Technique, rays: &Rays) -> Result<f64, CompareError> {
+pub fn time_cpu(
+    core: &Core,
+    field: &HeightField,
+    technique: &Technique,
+    rays: &Rays,
+    count: usize,
+) -> Result<f64, CompareError> {
     let options = MarchOptions { outputs: OutputSet::UV, ..MarchOptions::default() };
-    let start = Instant::now();
-    let hits =
-        march(field, technique, RayArray::F32(&rays.origins), RayArray::F32(&rays.directions), &options)?;
-    let seconds = start.elapsed().as_secs_f64();
-    std::hint::black_box(&hits);
-    Ok(seconds)
+    let some = 3 * count.min(rays.len());
+    let (origins, directions) =
+        (RayArray::F32(&rays.origins[..some]), RayArray::F32(&rays.directions[..some]));
+    core.time(|| Ok(march(field, technique, origins, directions, &options)?))
 }
 
 #[cfg(test)]
@@ -116,6 +122,7 @@ mod tests {
         let mut passes = 0;
         let slow = least_of_passes(|| {
             passes += 1;
+            std::thread::sleep(std::time::Duration::from_millis(2));
             Ok(7.0)
         });
         assert_eq!((slow.unwrap(), passes), (7.0, 2));
