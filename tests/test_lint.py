@@ -176,6 +176,24 @@ def test_tangents_on_mirrored_seams() -> None:
     assert codes(bw.lint(mesh=grid(None, along))) == []
 
 
+def test_tangents_of_this_package_are_none_that_were_stored(assets: Path) -> None:
+    # An OBJ has none; what it is given is MikkTSpace's, mirrored seams and all.
+    for name in ("obj/meshoptimizer/pirate.obj", "obj/mikktspace/rancid_geometry.obj"):
+        found = codes(bw.lint(mesh=assets / name))
+        assert not {"mirrored-seam-tangents", "bad-tangents", "tangent-space"} & set(found), name
+
+
+@pytest.mark.filterwarnings("ignore::bumpwgpu.BumpWarning")
+def test_parts_without_texture_coordinates_are_no_fault() -> None:
+    def half(uv: Any) -> Any:
+        return np.where(np.arange(len(uv))[:, None] < 15, 0.0, uv)
+
+    found = bw.lint(mesh=grid(half)).findings
+    assert ("no-uvs", "info") in [(f.code, f.severity) for f in found]
+    whole = bw.lint(mesh=grid()).findings
+    assert not whole
+
+
 def test_stored_tangents() -> None:
     turned = np.tile([1.0, 0.0, 0.0, -1.0], (25, 1))
     assert codes(bw.lint(mesh=grid(None, turned))) == ["wrong-handedness"]
@@ -204,6 +222,31 @@ def test_files_find_each_other_by_name(wall: bw.HeightMap, normals: np.ndarray, 
     (tmp_path / "wall_normal.png").rename(tmp_path / "rock_normal.png")
     assert codes(bw.lint(tmp_path)) == ["height-mismatch"]
     assert codes(bw.lint(tmp_path / "keep.png")) == ["unknown-role"]
+
+
+def test_names_of_one_letter_and_of_terrains(wall: bw.HeightMap, tmp_path: Path) -> None:
+    levels = np.rint(wall.array * 65535).astype(np.uint16)
+    turned = bw.bake(wall, convention="directx")["normal"]
+    for name in ("rock-h", "heightfield", "elevation_surface"):
+        Image.fromarray(levels).save(tmp_path / f"{name}.png")
+    Image.fromarray(np.rint((turned * 0.5 + 0.5) * 255).astype(np.uint8)).save(tmp_path / "rock-n.png")
+    report = bw.lint(tmp_path, scale=0.2)
+    assert len(report.checked) == 4
+    assert codes(report) == ["wrong-green"]
+
+
+def test_charts_need_not_tile(wall: bw.HeightMap, tmp_path: Path) -> None:
+    levels = np.rint(wall.array[:, :41] * 65535).astype(np.uint16)
+    Image.fromarray(levels).save(tmp_path / "wall_height.png")
+    assert not bw.lint(tmp_path)
+    corners = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+    faces = "f 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"
+    for far, passes in ((1, True), (3, False)):
+        uvs = f"vt 0 0\nvt {far} 0\nvt {far} {far}\nvt 0 {far}\n"
+        (tmp_path / "wall.obj").write_text(corners + uvs + faces)
+        report = bw.lint(tmp_path)
+        assert bool(report) is passes
+        assert codes(report) == ["tile-seam"] * len(report.findings)
 
 
 def test_damaged_files_are_findings(tmp_path: Path) -> None:
@@ -239,3 +282,18 @@ def test_real_assets_get_real_findings(assets: Path) -> None:
     assert "wrong-green" not in codes(rock)
     helmet = bw.lint(assets / "bevy" / "FlightHelmet" / "FlightHelmet.gltf")
     assert "mirrored-seam-tangents" in codes(helmet)
+
+
+@pytest.mark.slow
+def test_real_materials_are_told_apart(assets: Path) -> None:
+    # What fits of heights to normals, made elsewhere, say: depths; green down; both; another surface.
+    for folder, expected in (
+        ("paramap_earth", {"inverted-heights"}),
+        ("playcanvas", {"wrong-green"}),
+        ("panda3d", {"inverted-heights", "wrong-green"}),
+        ("godot", {"height-mismatch"}),
+        ("ambientcg/facade005", set()),
+        ("bevy/parallax_example", set()),
+    ):
+        found = set(codes(bw.lint(assets / folder)))
+        assert found & {"inverted-heights", "wrong-green", "height-mismatch"} == expected, folder

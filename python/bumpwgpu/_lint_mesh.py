@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from .errors import BumpError, BumpWarning
 from .meshes import Mesh
 
-__all__ = ["mesh_findings"]
+__all__ = ["inside_one_tile", "mesh_findings"]
 
 Found = tuple[str, str, str, str]
 
@@ -21,14 +22,14 @@ MOST_DENSITY_JUMP = 2.0
 MOST_JUMPS = 1e-3
 #: Angle to MikkTSpace that stored tangents may have at their 99th percentile, degrees.
 MOST_TANGENT_ANGLE = 5.0
+#: Components of tangents that differ by less come from the same program.
+_SAME = 1e-4
 
 
 def mesh_findings(source: Mesh | Path) -> list[Found]:
     """Looks at a mesh."""
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", BumpWarning)
-            mesh = source if isinstance(source, Mesh) else Mesh.open(source)
+        mesh = _opened(source)
     except (BumpError, ValueError, TypeError, OSError) as error:
         text = str(error).splitlines()
         return [("unreadable", "error", text[0] if text else type(error).__name__, "Export the file again.")]
@@ -38,11 +39,34 @@ def mesh_findings(source: Mesh | Path) -> list[Found]:
         return [("unreadable", "error", "there are no triangles", "Export the mesh again.")]
     if uvs.size == 0 or np.ptp(uvs, axis=0).max() == 0.0:
         return [("no-uvs", "error", "there are no texture coordinates", "Unwrap the mesh.")]
+    bare = (uvs[faces] == 0.0).all(axis=(1, 2))
+    found = []
+    if bare.any():
+        what = f"{int(bare.sum())} triangles have no texture coordinates, or all of them 0"
+        found.append(
+            ("no-uvs", "info", f"{what}; the first is {int(bare.argmax())}", "Unwrap what is textured.")
+        )
     return [
-        *_degenerate(positions, uvs, faces),
+        *found,
+        *_degenerate(positions, uvs, faces, bare),
         *_density(positions, uvs, faces),
         *_tangents(mesh, uvs, faces),
     ]
+
+
+def inside_one_tile(source: Mesh | Path) -> bool:
+    """Whether all UVs of a mesh lie in 0..1, as those of charts in an atlas do."""
+    try:
+        uvs = _opened(source).uvs
+    except (BumpError, ValueError, TypeError, OSError):
+        return False
+    return bool(uvs.size and uvs.min() >= -1e-3 and uvs.max() <= 1.001)
+
+
+def _opened(source: Mesh | Path) -> Mesh:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", BumpWarning)
+        return source if isinstance(source, Mesh) else Mesh.open(source)
 
 
 def _areas(
@@ -57,10 +81,13 @@ def _areas(
 
 
 def _degenerate(
-    positions: NDArray[np.float64], uvs: NDArray[np.float64], faces: NDArray[np.int64]
+    positions: NDArray[np.float64],
+    uvs: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    bare: NDArray[np.bool_],
 ) -> list[Found]:
     space, flat = _areas(positions, uvs, faces)
-    solid = space > 1e-12 * max(float(space.max()), 1e-300)
+    solid = ~bare & (space > 1e-12 * max(float(space.max()), 1e-300))
     bad = solid & (np.abs(flat) <= 1e-12 * max(float(np.abs(flat).max()), 1e-300))
     if not bad.any():
         return []
@@ -127,8 +154,12 @@ def _tangents(mesh: Mesh, uvs: NDArray[np.float64], faces: NDArray[np.int64]) ->
     shared = sides[:, 0] & sides[:, 1]
     found: list[Found] = []
     stored = mesh.vertex_tangents.astype(np.float64)
-    if stored.size == 0:
-        # Nothing to share: a mesh that is read without tangents is split at such seams.
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", BumpWarning)
+        made = mesh.tangents()
+    source = np.asarray(made.source)
+    if stored.size == 0 or np.abs(made.tangents - stored[source]).max() < _SAME:
+        # A mesh that comes without tangents is given MikkTSpace's, which are split at such seams.
         return []
     if shared.any():
         found.append(
@@ -140,11 +171,16 @@ def _tangents(mesh: Mesh, uvs: NDArray[np.float64], faces: NDArray[np.int64]) ->
                 "Split them and find tangents again: mesh.tangents().",
             )
         )
-    return [*found, *_stored(mesh, stored, sides, shared)]
+    return [*found, *_stored(mesh, stored, made.tangents.astype(np.float64), source, sides, shared)]
 
 
 def _stored(
-    mesh: Mesh, stored: NDArray[np.float64], sides: NDArray[np.bool_], shared: NDArray[np.bool_]
+    mesh: Mesh,
+    stored: NDArray[np.float64],
+    made: NDArray[np.float64],
+    source: NDArray[np.integer[Any]],
+    sides: NDArray[np.bool_],
+    shared: NDArray[np.bool_],
 ) -> list[Found]:
     """Tangents that came with the mesh."""
     found: list[Found] = []
@@ -175,11 +211,7 @@ def _stored(
                 "Find them again: mesh.tangents().",
             )
         )
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", BumpWarning)
-        made = mesh.tangents()
-    source = np.asarray(made.source)
-    cosine = (made.tangents[:, :3].astype(np.float64) * stored[source, :3]).sum(axis=1)
+    cosine = (made[:, :3] * stored[source, :3]).sum(axis=1)
     angle = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))[used[source] & ~shared[source]]
     worst = float(np.quantile(angle, 0.99)) if angle.size else 0.0
     if worst > MOST_TANGENT_ANGLE:

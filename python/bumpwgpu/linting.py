@@ -14,7 +14,7 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 from ._atomic import replace_file
 from ._checks import choice, number
 from ._lint_maps import cone_findings, height_findings, normal_findings
-from ._lint_mesh import mesh_findings
+from ._lint_mesh import inside_one_tile, mesh_findings
 from .heightmap import HeightMap, Wrap, checked_extent
 from .meshes import Mesh
 
@@ -65,9 +65,19 @@ _ROLES: tuple[tuple[str, frozenset[str]], ...] = (
     ("normal", frozenset({"normal", "normals", "nrm", "nor", "norm", "normalgl", "normaldx", "ddn"})),
     ("relaxed_cone", frozenset({"relaxedcone"})),
     ("cone", frozenset({"cone", "cones"})),
-    ("height", frozenset({"height", "heights", "heightmap", "displacement", "disp", "bump", "depth"})),
+    (
+        "height",
+        frozenset(
+            (
+                *("height", "heights", "heightmap", "heightfield", "displacement", "disp", "bump", "depth"),
+                *("elevation", "dem"),
+            )
+        ),
+    ),
     ("other", _OTHER),
 )
+#: What a last word of one letter says, as in rock-h.
+_LETTERS = {"h": "height", "n": "normal", "d": "other"}
 
 
 class Finding(NamedTuple):
@@ -245,9 +255,13 @@ def lint(
     settings = {"convention": convention, "wrap": wrap, "scale": depth, "tile_size": tile, "invert": invert}
     findings: list[Finding] = []
     heights: dict[tuple[str, str], HeightMap] = {}
+    # Maps beside a mesh whose UVs stay inside one tile need not tile.
+    charts = {part.family[0] for part in parts if part.role == "mesh" and inside_one_tile(part.source)}
     # Heights first: the other maps are held against them.
     for part in sorted(parts, key=lambda part: part.role != "height"):
         for code, severity, message, fix in _check(part, settings, heights):
+            if code == "tile-seam" and severity == "error" and part.family[0] in charts:
+                severity, message = "warning", f"{message}; the mesh beside it stays inside one tile"
             findings.append(Finding(code, severity, part.subject, message, fix))
     findings.sort(key=lambda finding: SEVERITIES.index(finding.severity))
     return LintReport(findings, [f"{part.subject} ({part.role})" for part in parts])
@@ -309,9 +323,12 @@ def _part(path: Path) -> _Part:
     joined = {first + second for first, second in itertools.pairwise(lowered)}
     for role, names in _ROLES:
         if names & {*lowered, *joined}:
-            kept = [word for word in lowered if word not in names and word not in ("gl", "dx", "relaxed")]
-            family = "_".join(kept)
+            said = [word for word in lowered if word not in names and word not in ("gl", "dx", "relaxed")]
+            family = "_".join(said)
             return _Part(role, path, str(path), (str(path.parent), family), frozenset({*lowered, *joined}))
+    if len(lowered) > 1 and lowered[-1] in _LETTERS:
+        kept = (str(path.parent), "_".join(lowered[:-1]))
+        return _Part(_LETTERS[lowered[-1]], path, str(path), kept, frozenset(lowered))
     return _Part("unknown", path, str(path), (str(path.parent), path.stem), frozenset(lowered))
 
 
