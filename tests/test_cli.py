@@ -18,6 +18,7 @@ from PIL import Image
 
 import bumpwgpu as bw
 from bumpwgpu import cli
+from bumpwgpu._cli_tools import CHECK_FAILED
 from bumpwgpu.baking import MAPS, about
 
 
@@ -230,7 +231,7 @@ def test_compare_fails_above_a_limit(folder: Path) -> None:
     sound = run(*words, "--techniques", "exact", "--fail-above", 0.1, cwd=folder)
     assert sound.returncode == 0, sound.stderr
     coarse = run(*(*words, "--techniques", "steep(steps=4),exact", "--fail-above", 0.1, "--json"), cwd=folder)
-    assert coarse.returncode == cli.CHECK_FAILED
+    assert coarse.returncode == CHECK_FAILED
     assert "steep(steps=4): p99 error" in coarse.stderr
     assert json.loads(coarse.stdout)["above"] == ["steep(steps=4)"]
 
@@ -284,7 +285,7 @@ def test_lint(folder: Path) -> None:
     down = bw.bake(heights, convention="directx")["normal"]
     Image.fromarray(((down * 0.5 + 0.5) * 255).round().astype(np.uint8)).save(folder / "normal.png")
     done = run("lint", ".", cwd=folder)
-    assert done.returncode == cli.CHECK_FAILED
+    assert done.returncode == CHECK_FAILED
     assert "[wrong-green]" in done.stdout
     assert run("lint", ".", "--convention", "directx", cwd=folder).returncode == 0
     data = json.loads(

@@ -18,10 +18,17 @@ from rich.table import Table
 
 from . import techniques
 from .errors import BumpError
+from .meshes import Mesh
 
 #: What a command ends with when it ran and what it checked did not hold.
 CHECK_FAILED = 3
 _T = TypeVar("_T")
+_MESHES: dict[str, Callable[[], Mesh]] = {
+    "quad": Mesh.quad,
+    "cube": Mesh.cube,
+    "sphere": Mesh.sphere,
+    "torus": Mesh.torus,
+}
 
 
 class WrapChoice(Enum):
@@ -192,3 +199,7 @@ def _range(text: str | None) -> Any:
 def _check_suffix(path: Path, known: tuple[str, ...]) -> None:
     if path.suffix.lower() not in known:
         raise typer.BadParameter(f"{path.name!r} must end in one of {', '.join(known)}")
+
+
+def _open_mesh(name: str) -> Mesh:
+    return _MESHES[name]() if name in _MESHES else Mesh.open(name)
