@@ -13,7 +13,7 @@ use crate::pareto::ERROR_FLOOR;
 use crate::run::Cell;
 use crate::stores::{Stores, device_march};
 use crate::timing::{least_of_passes, time_cpu};
-use crate::{CompareError, DeviceMarch, Metrics, Plan, RayErrors};
+use crate::{CompareError, DeviceMarch, Metrics, Plan, RayErrors, Rays};
 
 /// Rounds after which settings may leave.
 const SURE_ROUNDS: usize = 2;
@@ -55,14 +55,14 @@ impl Rounds<'_, '_> {
         for round in 1..=self.plan.repeats {
             // Those that left count as done.
             let mut over = (self.own.len() - left.len()) * self.sets.len();
-            for at in 0..self.sets.len() {
+            for (at, set) in self.sets.iter().enumerate() {
                 for &which in &left {
                     let text = format!(
                         "timing {}, round {round} of {}",
                         self.plan.settings[which], self.plan.repeats
                     );
                     tell(&text, 1 + std::mem::take(&mut over))?;
-                    self.sample(&core, which, at, &mut cells[which][at])?;
+                    self.sample(&core, which, &set.rays, &mut cells[which][at])?;
                 }
             }
             if round >= SURE_ROUNDS {
@@ -76,9 +76,8 @@ impl Rounds<'_, '_> {
         Ok(())
     }
 
-    fn sample(&self, core: &Core, which: usize, at: usize, cell: &mut Cell) -> Result<(), CompareError> {
+    fn sample(&self, core: &Core, which: usize, rays: &Rays, cell: &mut Cell) -> Result<(), CompareError> {
         let setting = &self.plan.settings[which];
-        let rays = &self.sets[at].rays;
         let field = self.stores.field(setting);
         let time = |count: usize| time_cpu(core, field, &setting.technique, rays, count);
         if cell.pass_rays == 0 {
