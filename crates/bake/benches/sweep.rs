@@ -1,56 +1,50 @@
-//! Horizons, ambient occlusion and distances of 1024 x 1024 height fields, smooth and rough.
+//! Horizons, ambient occlusion and distances of 1024 x 1024 maps.
+//!
+//! `cargo bench -p bake --bench sweep [-- part of a map's name]`. The least of some runs, of the clock and of all
+//! threads together.
+#![allow(missing_docs, clippy::unwrap_used)]
 
-use std::hint::black_box;
+mod maps;
+
+use std::io::Write;
 
 use bake::{Kernel, Progress, ao_map, distance_map, horizon_map};
-use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use heightfield::{HeightField, Wrap};
+use heightfield::HeightField;
+use maps::{SIDE, maps, timed, wanted};
 
-const SIDE: usize = 1024;
 const AZIMUTHS: usize = 32;
 const DEPTH: usize = 32;
+const RUNS: usize = 5;
 
-/// Waves, and the same with every texel shaken.
-fn fields() -> [(&'static str, HeightField); 2] {
-    let wave = |i: usize, periods: f32| (i as f32 * periods * std::f32::consts::TAU / SIDE as f32).sin();
-    let mut state = 1_u32;
-    let mut noise = move || {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (state >> 8) as f32 / (1 << 24) as f32
-    };
-    let smooth: Vec<f32> = (0..SIDE * SIDE)
-        .map(|at| 0.5 + 0.2 * wave(at % SIDE, 3.0) * wave(at / SIDE, 2.0) + 0.2 * wave(at / SIDE + at, 5.0))
-        .collect();
-    let rough: Vec<f32> = smooth.iter().map(|h| 0.7 * h + 0.3 * noise()).collect();
-    [("smooth", smooth), ("rough", rough)].map(|(name, texels)| {
-        match HeightField::new(&texels, SIDE, SIDE, Wrap::Repeat) {
-            Ok(field) => (name, field),
-            Err(error) => unreachable!("{error}"),
-        }
-    })
-}
-
-fn sweeps(criterion: &mut Criterion) {
-    let fields = fields();
-    let texels = (SIDE * SIDE) as u64;
-    let mut group = criterion.benchmark_group("sweep_1024");
-    group.sample_size(10);
-    for (name, field) in &fields {
-        let horizon = || horizon_map(field, AZIMUTHS, Progress::none()).unwrap_or_default();
-        let first = horizon();
-        assert!(first.len() == SIDE * SIDE * AZIMUTHS && first.iter().any(|&sine| sine > 0.1), "not timed");
-        group.throughput(Throughput::Elements(texels * AZIMUTHS as u64));
-        group.bench_function(format!("horizon/{name}"), |bencher| bencher.iter(|| black_box(horizon())));
-        group.bench_function(format!("ao/{name}"), |bencher| {
-            bencher.iter(|| black_box(ao_map(field, AZIMUTHS, Kernel::Sobel3, Progress::none())));
-        });
-        group.throughput(Throughput::Elements(texels * DEPTH as u64));
-        group.bench_function(format!("distance/{name}"), |bencher| {
-            bencher.iter(|| black_box(distance_map(field, DEPTH, Progress::none())));
-        });
+fn main() {
+    println!(
+        "{SIDE} x {SIDE}, {} threads; seconds of the clock (of all threads), the least of {RUNS}",
+        rayon::current_num_threads()
+    );
+    println!("{:<22} {:>15} {:>15} {:>15}", "map", "horizon, 32", "ao, 32", "distance, 32");
+    for (name, field) in &maps(&wanted()) {
+        print!("{name:<22}");
+        show(|| horizon(field));
+        show(|| ao_map(field, AZIMUTHS, Kernel::Sobel3, Progress::none()).unwrap());
+        show(|| distance_map(field, DEPTH, Progress::none()).unwrap());
+        println!();
     }
-    group.finish();
 }
 
-criterion_group!(benches, sweeps);
-criterion_main!(benches);
+fn horizon(field: &HeightField) -> Vec<f32> {
+    let map = horizon_map(field, AZIMUTHS, Progress::none()).unwrap();
+    // A flat map has none; all others do.
+    let flat = field.texels().iter().all(|&height| height == field.texels()[0]);
+    assert!(map.len() == SIDE * SIDE * AZIMUTHS && (flat || map.iter().any(|&sine| sine > 0.1)), "not timed");
+    map
+}
+
+fn show<T>(run: impl Fn() -> T) {
+    let (mut clock, mut cpu) = (f64::INFINITY, f64::INFINITY);
+    for _ in 0..RUNS {
+        let (clock_now, cpu_now, _) = timed(&run);
+        (clock, cpu) = (clock.min(clock_now), cpu.min(cpu_now));
+    }
+    print!(" {clock:>7.2} ({cpu:>5.2})");
+    std::io::stdout().flush().unwrap();
+}

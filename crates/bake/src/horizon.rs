@@ -23,7 +23,7 @@ use rayon::prelude::*;
 
 use crate::encode::Range;
 use crate::maps::{Channel, Form, Kind, Layer, Map, MapInfo, MapOption, Plan};
-use crate::sweep::{Grids, Lines, RowScratch, transposed, working_bytes};
+use crate::sweep::{Grids, Lines, RowScratch, transpose, working_bytes};
 use crate::{BakeError, Progress};
 
 /// Most azimuths of a map.
@@ -35,7 +35,7 @@ pub static HORIZON: Map = Map {
         name: "horizon",
         summary: "sine of the horizon's elevation, 0..1, one slice an azimuth, from +X towards +Y (up)",
         source: "Max 1988; Timonen and Westerholm 2010",
-        version: 1,
+        version: 2,
         costly: true,
         form: Form::Stack { axis: "azimuth" },
         channels: &[Channel::fixed("sine", Range::UNIT)],
@@ -114,7 +114,7 @@ pub fn horizon_map(
             .enumerate()
             .for_each_init(RowScratch::default, |scratch, (at, out)| sweep.texels(&lines, at, scratch, out));
         if sweep.plan.along_x {
-            plane.copy_from_slice(&transposed(&turned, height, width));
+            transpose(&turned, height, width, plane);
         }
         progress.report(height * (k + 1) / azimuths, height)?;
     }

@@ -1,290 +1,172 @@
-//! The sweep over a block of lines: what rises beyond the nearest steps.
+//! Upper convex hulls of what lies ahead on neighbouring lines, one a lane, and their tangents.
+//!
+//! Each lane has a stack of corners, the nearest on top. A line passes a few corners a step, and its tangent moves by
+//! a few: the lanes take as many turns as the one that needs most. All numbers are `f32`; where a step is rounded, the
+//! height is that of the surface there, so steps and heights fit together.
 
-use heightfield::lanes;
+// Corners are read at different depths.
+#![allow(unsafe_code)]
 
-use super::plan::Sample;
-use super::{FAR_FROM, Grid, LANES, Plan};
+use heightfield::lanes::Lanes;
 
-/// Working memory of one task.
-#[derive(Default)]
-pub(super) struct Scratch {
-    /// Heights of all lines at each sample.
-    heights: Vec<[f32; LANES]>,
-    /// Which lines may have a corner of a hull at each sample, 1 or 0.
-    corners: Vec<[u8; LANES]>,
-    /// The samples of one line that may be corners.
-    kept: Vec<u32>,
-    /// Room for the hull ahead of the point at hand, farthest first.
-    hull: Vec<Point>,
+/// Below every height by so much that no corner is hidden in front of it, and finite when it is multiplied.
+const NOTHING: f32 = -1e30;
+/// Corners looked at one after another before the rest is halved again and again.
+const LINEAR_TRIES: u32 = 6;
+
+/// A point on each line.
+#[derive(Clone, Copy)]
+pub(super) struct Points<L: Lanes> {
+    pub step: L::F,
+    pub height: L::F,
 }
 
-/// What a point of a line sees beyond the nearest steps.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Far {
-    /// Steepest rise, height per step; may be below 0.
-    pub rise: f32,
-    /// 1 / steps to the point that rises so; 0 where there is none.
-    pub nearness: f32,
-}
-
-/// A point of a line.
-#[derive(Debug, Clone, Copy)]
-struct Point {
-    step: f64,
-    height: f64,
-}
-
-impl Point {
-    /// Whether `far` rises at least as steeply as `near`, seen from here.
+impl<L: Lanes> Points<L> {
+    /// Where `far` rises at least as steeply as `near`, seen from here.
     #[inline(always)]
-    fn sees_past(&self, near: &Point, far: &Point) -> bool {
-        (near.height - self.height) * (far.step - self.step)
-            <= (far.height - self.height) * (near.step - self.step)
+    fn see_past(&self, near: &Self, far: &Self) -> L::M {
+        let (near_rise, far_rise) = (near.height - self.height, far.height - self.height);
+        L::le(near_rise * (far.step - self.step), far_rise * (near.step - self.step))
     }
-}
 
-/// `LANES` lines to be swept, the first starting at `line` on the cross axis, into `out`, `[step][line]`;
-/// steps beside the map are left as they are.
-pub(super) struct SweepLines<'a> {
-    pub plan: &'a Plan,
-    pub grid: &'a Grid,
-    pub line: i64,
-    pub scratch: &'a mut Scratch,
-    pub out: &'a mut [Far],
-}
-
-/// The steps of a line that pass a texel, and how far it is followed.
-#[derive(Debug, Clone, Copy)]
-struct Reach {
-    first: usize,
-    last: usize,
-    end: usize,
-}
-
-impl lanes::Kernel for SweepLines<'_> {
-    type Output = ();
-
-    /// Of the lanes only the instruction set is taken.
     #[inline(always)]
-    fn run<L: lanes::Lanes>(self) {
-        let Self { plan, grid, line, scratch, out } = self;
-        let mut reaches = [None; LANES];
-        for (lane, reach) in reaches.iter_mut().enumerate() {
-            let line = line + lane as i64;
-            if line < plan.first_line + plan.line_count as i64 {
-                *reach = plan.receivers(line).map(|(first, last)| Reach {
-                    first,
-                    last,
-                    end: plan.end(line, last),
-                });
+    fn select(mask: L::M, yes: &Self, no: &Self) -> Self {
+        Self { step: L::select(mask, yes.step, no.step), height: L::select(mask, yes.height, no.height) }
+    }
+}
+
+/// See the module.
+pub(super) struct Hulls<'a, L: Lanes> {
+    /// Step and height of each corner, `[depth][lane]`; the lowest is [`NOTHING`].
+    corners: &'a mut [[f32; 2]],
+    lane: L::I,
+    /// Depth of the uppermost corner, at least 1, and below half of `corners` even where it grows by one.
+    depth: L::I,
+    top: Points<L>,
+    below: Points<L>,
+    /// Depth of the corner that was seen last.
+    seen: L::I,
+}
+
+/// 1 where the mask is set.
+#[inline(always)]
+fn ones<L: Lanes>(mask: L::M) -> L::I {
+    L::select_int(mask, L::splat_int(1), L::splat_int(0))
+}
+
+impl<'a, L: Lanes> Hulls<'a, L> {
+    /// Hulls of one corner, that will be of no more than `most`.
+    #[inline(always)]
+    pub fn new(room: &'a mut Vec<[f32; 2]>, most: usize, first: Points<L>) -> Self {
+        // The lowest, and what is written above the uppermost.
+        room.resize(room.len().max((most + 2) * L::WIDTH), [0.0; 2]);
+        let mut step = [0.0; 16];
+        let mut height = [0.0; 16];
+        L::store(first.step, &mut step);
+        L::store(first.height, &mut height);
+        let mut lanes = [0; 16];
+        for (lane, number) in lanes[..L::WIDTH].iter_mut().enumerate() {
+            *number = lane as i32;
+            room[lane] = [step[lane] + 1.0, NOTHING];
+            room[L::WIDTH + lane] = [step[lane], height[lane]];
+        }
+        let one = L::splat_int(1);
+        let nothing = Points { step: first.step + L::splat(1.0), height: L::splat(NOTHING) };
+        Self { corners: room, lane: L::load_int(&lanes), depth: one, top: first, below: nothing, seen: one }
+    }
+
+    /// The corners at a depth, from 0 to one above the uppermost.
+    #[inline(always)]
+    fn at(&self, depth: L::I) -> Points<L> {
+        let place = (depth * L::splat_int(L::WIDTH as i32) + self.lane) * L::splat_int(2);
+        // SAFETY: depths begin at 0, grow by one with each point, and `new` made room for all of them.
+        let (step, height) = unsafe { L::gather_pairs(self.corners.as_flattened(), place) };
+        Points { step, height }
+    }
+
+    /// Adds a point in front of the chosen hulls; takes off the corners that it hides from all before it.
+    #[inline(always)]
+    pub fn push(&mut self, point: Points<L>, chosen: L::M) {
+        let one = L::splat_int(1);
+        let mut hides = chosen & point.see_past(&self.top, &self.below);
+        while L::any(hides) {
+            self.depth = self.depth - ones::<L>(hides);
+            self.top = Points::select(hides, &self.below, &self.top);
+            // Elsewhere it is what it was.
+            self.below = self.at(self.depth - one);
+            hides = hides & point.see_past(&self.top, &self.below);
+        }
+        self.below = Points::select(chosen, &self.top, &self.below);
+        self.top = Points::select(chosen, &point, &self.top);
+        let mut depths = [0; 16];
+        let mut points = [[0.0; 16]; 2];
+        L::store_int(self.depth + one, &mut depths);
+        L::store(point.step, &mut points[0]);
+        L::store(point.height, &mut points[1]);
+        for lane in 0..L::WIDTH {
+            // Where it is not chosen it lies above the uppermost, where nobody looks.
+            if let Some(corner) = self.corners.get_mut(depths[lane] as usize * L::WIDTH + lane) {
+                *corner = [points[0][lane], points[1][lane]];
             }
         }
-        let (mut first, mut last, mut end) = (usize::MAX, 0, 0);
-        for reach in reaches.iter().flatten() {
-            (first, last, end) = (first.min(reach.first), last.max(reach.last), end.max(reach.end));
+        self.depth = self.depth + ones::<L>(chosen);
+    }
+
+    /// The corners that rise most steeply from `eyes`, beginning with those that were seen last: what the eyes next
+    /// to these saw is mostly near.
+    #[inline(always)]
+    pub fn tangent(&mut self, eyes: &Points<L>) -> Points<L> {
+        // From near to far the rise grows up to the tangent and falls from there on. That is the last corner, from the
+        // far end on, beyond which it does not rise; nothing rises beyond the lowest.
+        let one = L::splat_int(1);
+        let mut at = L::min_int(self.seen, self.depth);
+        let mut here = self.at(at);
+        let mut beyond = self.at(at - one);
+        let down = eyes.see_past(&here, &beyond);
+        let (mut sinks, mut tries) = (down, LINEAR_TRIES);
+        while L::any(sinks) && tries > 0 {
+            at = at - ones::<L>(sinks);
+            here = Points::select(sinks, &beyond, &here);
+            beyond = self.at(at - one);
+            sinks = sinks & eyes.see_past(&here, &beyond);
+            tries -= 1;
         }
-        if end == 0 {
-            return;
-        }
-        let samples = plan.samples(first, end);
-        heights_of(plan, grid, line, samples, &mut scratch.heights);
-        mark_corners(samples, &scratch.heights, &mut scratch.corners);
-        look_just_ahead(plan, [first, last], samples, &scratch.heights, out);
-        for (lane, reach) in reaches.into_iter().enumerate() {
-            if let Some(reach) = reach {
-                sweep_line(plan, first, reach, samples, lane, scratch, out);
+        let mut climbs = !down & L::lt_int(at, self.depth);
+        tries = LINEAR_TRIES;
+        while L::any(climbs) {
+            let before = self.at(L::min_int(at + one, self.depth));
+            climbs = climbs & !eyes.see_past(&before, &here);
+            if tries == 0 {
+                break;
             }
+            at = at + ones::<L>(climbs);
+            here = Points::select(climbs, &before, &here);
+            climbs = climbs & L::lt_int(at, self.depth);
+            tries -= 1;
         }
-    }
-}
-
-/// Sweeps one of the lines whose samples begin at step `first`.
-#[inline(always)]
-fn sweep_line(
-    plan: &Plan,
-    first: usize,
-    reach: Reach,
-    samples: &[Sample],
-    lane: usize,
-    scratch: &mut Scratch,
-    out: &mut [Far],
-) {
-    let Scratch { heights, corners, kept, hull } = scratch;
-    let count = plan.samples_between(first, reach.end) + 1;
-    let (samples, heights) = (&samples[..count], &heights[..count]);
-    let mut waiting = keep(&corners[..count], lane, kept);
-    hull.resize(hull.len().max(waiting), Point { step: 0.0, height: 0.0 });
-    // Corners of the hull, and which of them the step before saw.
-    let (mut corners, mut seen) = (0, 0);
-    for step in (reach.first..=reach.last).rev() {
-        let out = &mut out[step * LANES + lane];
-        let from = step + FAR_FROM;
-        if from > reach.end {
-            *out = Far::default();
-            continue;
+        if L::any(sinks | climbs) {
+            at = self.halve(eyes, at, sinks, climbs);
+            here = self.at(at);
         }
-        let from = plan.samples_between(first, from);
-        while waiting > 0 && kept[waiting - 1] as usize >= from {
-            waiting -= 1;
-            let at = kept[waiting] as usize;
-            let point = Point { step: samples[at].step, height: f64::from(heights[at][lane]) };
-            corners = push(hull, corners, point);
-        }
-        let far = if corners > 0 {
-            let height = heights[plan.samples_between(first, step)][lane];
-            let eye = Point { step: step as f64, height: f64::from(height) };
-            seen = tangent(&hull[..corners], &eye, seen);
-            let steepest = &hull[seen];
-            let nearness = 1.0 / (steepest.step - eye.step);
-            Far { rise: ((steepest.height - eye.height) * nearness) as f32, nearness: nearness as f32 }
-        } else {
-            Far::default()
-        };
-        // The nearest two samples may be corners only because those before them do not count.
-        if far.rise >= out.rise {
-            *out = far;
-        }
+        self.seen = at;
+        here
     }
-}
 
-/// What each line sees of the first two samples that count.
-#[inline(always)]
-fn look_just_ahead(
-    plan: &Plan,
-    [first, last]: [usize; 2],
-    samples: &[Sample],
-    heights: &[[f32; LANES]],
-    out: &mut [Far],
-) {
-    for step in first..=last {
-        let from = plan.samples_between(first, step + FAR_FROM);
-        let Some(near) = samples.get(from) else { break };
-        let next = if from + 1 < samples.len() { from + 1 } else { from };
-        let own = &heights[plan.samples_between(first, step)];
-        let (a, b) = (&heights[from], &heights[next]);
-        let nearness = [near, &samples[next]].map(|sample| (1.0 / (sample.step - step as f64)) as f32);
-        let Some(out) = out[step * LANES..].first_chunk_mut::<LANES>() else { break };
-        for lane in 0..LANES {
-            let rises = [(a[lane] - own[lane]) * nearness[0], (b[lane] - own[lane]) * nearness[1]];
-            let first = rises[0] >= rises[1];
-            let rise = if first { rises[0] } else { rises[1] };
-            let nearness = if first { nearness[0] } else { nearness[1] };
-            out[lane] = Far { rise, nearness };
-        }
-    }
-}
-
-/// Marks the samples that rise above the chord of their neighbours, next and next but one, on each
-/// line. No other can be a corner of the hull but at its near end.
-#[inline(always)]
-fn mark_corners(samples: &[Sample], heights: &[[f32; LANES]], corners: &mut Vec<[u8; LANES]>) {
-    corners.clear();
-    corners.resize(samples.len(), [1; LANES]);
-    for ((samples, heights), corners) in
-        samples.windows(5).zip(heights.windows(5)).zip(corners.iter_mut().skip(2))
-    {
-        let [a, b, own, c, d] = heights else { continue };
-        let near = samples[2].share_of(&samples[1], &samples[3]);
-        let wide = samples[2].share_of(&samples[0], &samples[4]);
-        for lane in 0..LANES {
-            let above_near = own[lane] > b[lane] + (c[lane] - b[lane]) * near;
-            let above_wide = own[lane] > a[lane] + (d[lane] - a[lane]) * wide;
-            corners[lane] = u8::from(above_near & above_wide);
-        }
-    }
-}
-
-/// Lists the samples marked for one line, and the last of all; returns their number.
-#[inline(always)]
-fn keep(corners: &[[u8; LANES]], lane: usize, kept: &mut Vec<u32>) -> usize {
-    kept.resize(corners.len().max(kept.len()), 0);
-    let mut count = 0;
-    for (at, marks) in corners.iter().enumerate() {
-        kept[count] = at as u32;
-        count += usize::from(marks[lane]);
-    }
-    // The end of the line is a corner whatever it is like.
-    if count == 0 || kept[count - 1] as usize + 1 != corners.len() {
-        kept[count] = corners.len() as u32 - 1;
-        count += 1;
-    }
-    count
-}
-
-/// Heights of the bilinear surface at the samples of all lines.
-#[inline(always)]
-fn heights_of(plan: &Plan, grid: &Grid, line: i64, samples: &[Sample], heights: &mut Vec<[f32; LANES]>) {
-    heights.resize(heights.len().max(samples.len()), [0.0; LANES]);
-    heights.truncate(samples.len());
-    for (heights, sample) in heights.iter_mut().zip(samples) {
-        let main = grid.main(plan.main(sample.column));
-        column(grid.lanes(main, line + sample.row), sample.row_share, heights);
-        if sample.column_share > 0.0 {
-            let mut next = [0.0; LANES];
-            let main = grid.main(plan.main(sample.column + 1));
-            column(grid.lanes(main, line + sample.row), sample.row_share, &mut next);
-            for lane in 0..LANES {
-                heights[lane] += (next[lane] - heights[lane]) * sample.column_share;
-            }
-        }
-    }
-}
-
-/// Heights between neighbours.
-#[inline(always)]
-fn column(run: &[f32; LANES + 1], share: f32, heights: &mut [f32; LANES]) {
-    for lane in 0..LANES {
-        heights[lane] = run[lane] + (run[lane + 1] - run[lane]) * share;
-    }
-}
-
-/// Adds a point in front of the hull, of which there are `corners`; takes off those that it hides from
-/// all before it. Returns how many there are then.
-#[inline(always)]
-fn push(hull: &mut [Point], mut corners: usize, point: Point) -> usize {
-    while corners > 1 && point.sees_past(&hull[corners - 1], &hull[corners - 2]) {
-        corners -= 1;
-    }
-    hull[corners] = point;
-    corners + 1
-}
-
-/// The corner of a hull that rises most steeply from `eye`, beginning with a guess: what the eye next to
-/// this one saw is mostly near it.
-#[inline(always)]
-fn tangent(hull: &[Point], eye: &Point, guess: usize) -> usize {
-    // From near to far the rise grows up to the tangent and falls from there on.
-    let rises_after = |at: usize| at > 0 && eye.sees_past(&hull[at], &hull[at - 1]);
-    let guess = guess.min(hull.len() - 1);
-    // The tangent is the last corner, from the far end on, beyond which it does not rise.
-    let (mut low, mut high);
-    if rises_after(guess) {
-        (low, high) = (0, guess);
-        for _ in 0..LINEAR_TRIES {
-            if !rises_after(high - 1) {
-                return high - 1;
-            }
-            high -= 1;
-        }
-    } else {
-        (low, high) = (guess, hull.len());
-        for _ in 0..LINEAR_TRIES {
-            if low + 1 == high || rises_after(low + 1) {
+    /// The depth of the tangent, which lies below `at` or above it, or is there.
+    #[inline(always)]
+    fn halve(&self, eyes: &Points<L>, at: L::I, below: L::M, above: L::M) -> L::I {
+        let one = L::splat_int(1);
+        let mut low = L::select_int(below, one, at);
+        let mut high = L::select_int(above, self.depth + one, at + ones::<L>(!below));
+        loop {
+            let open = L::lt_int(low + one, high);
+            if !L::any(open) {
                 return low;
             }
-            low += 1;
+            let middle = L::to_int(L::to_float(low + high) * L::splat(0.5));
+            let rises = eyes.see_past(&self.at(middle), &self.at(middle - one));
+            high = L::select_int(open & rises, middle, high);
+            low = L::select_int(open & !rises, middle, low);
         }
     }
-    while high - low > 1 {
-        let middle = low.midpoint(high);
-        if rises_after(middle) {
-            high = middle;
-        } else {
-            low = middle;
-        }
-    }
-    low
 }
-
-/// Corners looked at one after another before the rest is halved again and again.
-const LINEAR_TRIES: u32 = 4;

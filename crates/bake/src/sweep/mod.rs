@@ -17,8 +17,11 @@
 
 mod grid;
 mod hull;
+mod lines;
 mod near;
 mod plan;
+#[cfg(test)]
+mod tests;
 
 use heightfield::{HeightField, lanes};
 use rayon::prelude::*;
@@ -26,7 +29,7 @@ use rayon::prelude::*;
 use crate::maps;
 
 use grid::Grid;
-use hull::{Far, Scratch, SweepLines};
+use lines::{Far, Scratch, SweepLines};
 use plan::Plan;
 
 /// Lines swept together. Their samples share one weight, so a lane of samples is one vector.
@@ -40,14 +43,15 @@ const FAR_FROM: usize = 6;
 /// What is seen along the lines of one azimuth; kept between azimuths for its memory.
 #[derive(Default)]
 pub(crate) struct Lines {
-    /// `[block of lines][step][line]`.
+    /// `[block of lines][step]`.
     far: Vec<Far>,
 }
 
-/// Working memory for one row of texels.
+/// Working memory for one row of texels: what is seen along the lines beside them.
 #[derive(Default)]
 pub(crate) struct RowScratch {
-    far: Vec<Far>,
+    rises: Vec<f32>,
+    nearness: Vec<f32>,
 }
 
 /// One azimuth of a field: the plan of its lines, and the grid on which they run.
@@ -64,10 +68,11 @@ pub(crate) struct Grids {
 
 /// Bytes that sweeps over a map need at most.
 pub(crate) fn working_bytes(grid: maps::Grid) -> u128 {
-    let [w, h] = grid.cells().map(|n| n as u128 + 64);
-    let heights = 2 * w * h * size_of::<f32>() as u128;
+    let heights =
+        Grid::bytes(grid.width, grid.height, grid.wrap) + Grid::bytes(grid.height, grid.width, grid.wrap);
+    let [w, h] = [grid.width, grid.height].map(|n| n as u128 + LANES as u128);
     // Slanted lines that do not come round are up to twice as many as texels across them.
-    let lines = 2 * (grid.texels() + w + h) * size_of::<Far>() as u128;
+    let lines = 2 * w * h * (size_of::<Far>() / LANES) as u128;
     heights + lines + grid.texels() * size_of::<f32>() as u128
 }
 
@@ -83,7 +88,7 @@ impl Grids {
 
     /// The sweep towards a horizontal direction of mesh space, x right and y **up** the image.
     pub fn towards(&self, field: &HeightField, direction: [f64; 2]) -> Sweep<'_> {
-        let plan = Plan::new(field, direction);
+        let plan = Plan::new(field, [&self.along_x, &self.along_y], direction);
         let grid = if plan.along_x { &self.along_x } else { &self.along_y };
         Sweep { plan, grid }
     }
@@ -92,7 +97,7 @@ impl Grids {
 impl Sweep<'_> {
     /// Sweeps all lines into `lines`.
     pub fn run(&self, lines: &mut Lines) {
-        let block = self.plan.steps * LANES;
+        let block = stride(&self.plan);
         let blocks = self.plan.line_count.div_ceil(LANES);
         // What an earlier azimuth left stands only where no texel reads.
         lines.far.resize(blocks * block, Far::default());
@@ -112,21 +117,32 @@ impl Sweep<'_> {
         let offset = -plan.slant * step as f64;
         let lower = offset.floor();
         let share = (offset - lower) as f32;
-        self.gather(lines, step, lower as i64 - plan.first_line, n + 1, &mut scratch.far);
-        lanes::dispatch(RowOfTexels { sweep: self, step: step as i64, share, far: &scratch.far[..=n], out });
+        self.gather(lines, step, lower as i64 - plan.first_line, n + 1, scratch);
+        let RowScratch { rises, nearness } = &*scratch;
+        let (rises, nearness) = (&rises[..=n], &nearness[..=n]);
+        lanes::dispatch(RowOfTexels { sweep: self, step: step as i64, share, rises, nearness, out });
     }
 
-    /// `count` points of the lines at a step, from line `first` of the plan on.
-    fn gather(&self, lines: &Lines, step: usize, first: i64, count: usize, row: &mut Vec<Far>) {
+    /// What `count` lines see at a step, from line `first` of the plan on.
+    fn gather(&self, lines: &Lines, step: usize, first: i64, count: usize, row: &mut RowScratch) {
         let plan = &self.plan;
+        let RowScratch { rises, nearness } = row;
         let all = plan.line_count as i64;
         let mut line = if plan.cyclic { first.rem_euclid(all) } else { first.clamp(0, all - 1) } as usize;
-        row.clear();
-        while row.len() < count {
+        rises.clear();
+        nearness.clear();
+        while rises.len() < count {
             let (block, lane) = (line / LANES, line % LANES);
-            let run = (LANES - lane).min(plan.line_count - line).min(count - row.len());
-            let from = (block * plan.steps + step) * LANES + lane;
-            row.extend_from_slice(&lines.far[from..from + run]);
+            let run = (LANES - lane).min(plan.line_count - line).min(count - rises.len());
+            let far = &lines.far[block * stride(plan) + step];
+            if run == LANES {
+                // Of a size known beforehand: two moves in place of two calls.
+                rises.extend_from_slice(&far.rises);
+                nearness.extend_from_slice(&far.nearness);
+            } else {
+                rises.extend_from_slice(&far.rises[lane..lane + run]);
+                nearness.extend_from_slice(&far.nearness[lane..lane + run]);
+            }
             line += run;
             if line == plan.line_count {
                 if !plan.cyclic {
@@ -136,8 +152,15 @@ impl Sweep<'_> {
             }
         }
         // Open lines reach one beyond the last texel wherever its weight is not 0.
-        row.resize(count, Far::default());
+        rises.resize(count, 0.0);
+        nearness.resize(count, 0.0);
     }
+}
+
+/// Steps from one block of lines to the next: odd, so that the same step of many blocks does not fall on the same few
+/// places of the cache.
+fn stride(plan: &Plan) -> usize {
+    plan.steps | 1
 }
 
 /// A row of texels to be given their horizon.
@@ -147,7 +170,8 @@ struct RowOfTexels<'a> {
     /// How far each texel lies from its line to the next.
     share: f32,
     /// What is seen along the line of each texel, and the one after the last.
-    far: &'a [Far],
+    rises: &'a [f32],
+    nearness: &'a [f32],
     out: &'a mut [f32],
 }
 
@@ -157,18 +181,19 @@ impl lanes::Kernel for RowOfTexels<'_> {
     /// Of the lanes only the instruction set is taken.
     #[inline(always)]
     fn run<L: lanes::Lanes>(self) {
-        let Self { sweep: Sweep { plan, grid }, step, share, far, out } = self;
+        let Self { sweep: Sweep { plan, grid }, step, share, rises, nearness, out } = self;
         let n = out.len();
         near::rises(plan, grid, step, out);
         let slope = plan.slope as f32;
         let (before, own, after) = near::neighbours(plan, grid, step);
-        let (before, own, after, far) = (&before[..n], &own[..n], &after[..n], &far[..=n]);
+        let (before, own, after) = (&before[..n], &own[..n], &after[..n]);
+        let (rises, nearness) = (&rises[..=n], &nearness[..=n]);
         let bulge = share * (1.0 - share);
         for j in 0..n {
             // How much higher the texel is than what its two lines say of it.
             let excess = bulge * (2.0 * own[j] - before[j] - after[j]);
-            let a = sine((far[j].rise - excess * far[j].nearness) * slope);
-            let b = sine((far[j + 1].rise - excess * far[j + 1].nearness) * slope);
+            let a = sine((rises[j] - excess * nearness[j]) * slope);
+            let b = sine((rises[j + 1] - excess * nearness[j + 1]) * slope);
             let (near, far) = (sine(out[j] * slope), a + (b - a) * share);
             out[j] = if near > far { near } else { far };
         }
@@ -189,8 +214,14 @@ pub(crate) fn transposed<T: Copy + Default + Send + Sync>(
     width: usize,
     height: usize,
 ) -> Vec<T> {
-    const TILE: usize = 32;
     let mut turned = vec![T::default(); values.len()];
+    transpose(values, width, height, &mut turned);
+    turned
+}
+
+/// As [`transposed`], into as many values.
+pub(crate) fn transpose<T: Copy + Send + Sync>(values: &[T], width: usize, height: usize, turned: &mut [T]) {
+    const TILE: usize = 32;
     turned.par_chunks_mut(height * TILE).enumerate().for_each(|(block, columns)| {
         for top in (0..height).step_by(TILE) {
             for (i, column) in columns.chunks_mut(height).enumerate() {
@@ -201,5 +232,4 @@ pub(crate) fn transposed<T: Copy + Default + Send + Sync>(
             }
         }
     });
-    turned
 }

@@ -2,15 +2,17 @@
 
 use heightfield::{HeightField, Wrap};
 
-use super::NEAR;
+use super::{Grid, NEAR};
 
 /// Closer to a column of texels than this, in texels, a row of texels is not sampled again: rounding
 /// would decide about the slope between the two.
 const APART: f64 = 1.0 / 512.0;
+/// Samples on each side that one is compared with before it is taken for a corner of a hull.
+pub(super) const CHORDS: usize = 3;
 /// Slants below this are rounding of an azimuth along an axis.
 const STRAIGHT: f64 = 1e-12;
 
-/// Where a line is sampled; the same for all lines but for whole texels of the cross axis.
+/// Where a texel's own line is sampled; the same for all lines but for whole texels of the cross axis.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sample {
     /// Steps along the line, in texels of the main axis.
@@ -35,12 +37,21 @@ impl Sample {
             column_share: (step - step.floor()) as f32,
         }
     }
+}
 
-    /// How far along it lies between two others.
-    #[inline(always)]
-    pub fn share_of(&self, before: &Self, after: &Self) -> f32 {
-        ((self.step - before.step) / (after.step - before.step)) as f32
-    }
+/// Where the lines of a sweep are sampled, ready for many lines.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FarSample {
+    /// Steps along the line, in texels of the main axis.
+    pub step: f32,
+    /// The texels of the main axis before and after it.
+    pub main: [u32; 2],
+    /// Place of the cross axis at or before the sample, relative to the line's: see [`Grid::lanes`].
+    pub place: i32,
+    /// How far the sample is from it and from the first texel of the main axis, 0..1.
+    pub shares: [f32; 2],
+    /// How far along it lies between the samples beside it, between those beside them, and so on.
+    pub chords: [f32; CHORDS],
 }
 
 /// The lines of one azimuth.
@@ -67,14 +78,16 @@ pub(crate) struct Plan {
     /// Samples of the first [`NEAR`] steps: wherever a line meets a row or column of texels, and
     /// before each of them the middle of the way there.
     pub near: Vec<Sample>,
-    far: Vec<Sample>,
+    /// Samples of lines: at every whole step and wherever they meet a row of texels between.
+    far: Vec<FarSample>,
     /// Index in `far` of the sample at each whole step.
     whole: Vec<u32>,
     wrap: Wrap,
 }
 
 impl Plan {
-    pub fn new(field: &HeightField, direction: [f64; 2]) -> Self {
+    /// The plan towards a horizontal unit direction; `grids`: of main axis x, and y.
+    pub fn new(field: &HeightField, grids: [&Grid; 2], direction: [f64; 2]) -> Self {
         let extent = field.extent();
         let size = [field.width(), field.height()];
         let texel = [0, 1].map(|axis| f64::from(extent.tile_size[axis]) / size[axis] as f64);
@@ -94,10 +107,12 @@ impl Plan {
             let last = drift.max(0.0).floor() as i64 + cross as i64;
             (first, (last - first + 1) as usize)
         };
-        let (far, whole) = samples(slant, (2 * steps).max(NEAR));
+        let (samples, whole) = samples(slant, (2 * steps).max(NEAR));
+        let forward = advance[main] > 0.0;
+        let row = |column: i64| grids[main].main(if forward { column } else { steps as i64 - 1 - column });
         Self {
             along_x,
-            forward: advance[main] > 0.0,
+            forward,
             slant,
             steps,
             cross,
@@ -106,8 +121,8 @@ impl Plan {
             cyclic,
             slope: f64::from(extent.scale) / texel[main].hypot(slant * texel[other]),
             direction,
-            near: with_middles(&far[..=whole[NEAR] as usize], slant),
-            far,
+            near: with_middles(&samples[..=whole[NEAR] as usize], slant),
+            far: prepared(&samples, slant, grids[main], row),
             whole,
             wrap: field.wrap(),
         }
@@ -149,7 +164,7 @@ impl Plan {
 
     /// The samples of steps `first..=last`, wherever a line meets a row or column of texels.
     #[inline(always)]
-    pub fn samples(&self, first: usize, last: usize) -> &[Sample] {
+    pub fn samples(&self, first: usize, last: usize) -> &[FarSample] {
         &self.far[self.whole[first] as usize..=self.whole[last] as usize]
     }
 
@@ -185,6 +200,29 @@ fn samples(slant: f64, last: usize) -> (Vec<Sample>, Vec<u32>) {
         samples.push(Sample::new(step, slant * step));
     }
     (samples, whole)
+}
+
+/// Samples with what many lines ask of them. Their steps are rounded, and with them the places that they name; `row`
+/// gives the texel of the main axis at a column.
+fn prepared(samples: &[Sample], slant: f64, grid: &Grid, row: impl Fn(i64) -> usize) -> Vec<FarSample> {
+    let step = |at: usize| f64::from(samples[at.min(samples.len() - 1)].step as f32);
+    let share = |at: usize, apart: usize| {
+        let (before, after) = (step(at.saturating_sub(apart)), step(at + apart));
+        ((step(at) - before) / (after - before)) as f32
+    };
+    (0..samples.len())
+        .map(|at| {
+            let Sample { step, row: place, row_share, column, column_share } =
+                Sample::new(step(at), slant * step(at));
+            FarSample {
+                step: step as f32,
+                main: [row(column) as u32, row(column + 1) as u32],
+                place: grid.relative(place),
+                shares: [row_share, column_share],
+                chords: std::array::from_fn(|apart| share(at, apart + 1)),
+            }
+        })
+        .collect()
 }
 
 /// The samples after the first, each preceded by the middle of the way from the one before.
