@@ -89,7 +89,7 @@ pub static CONE: Map = Map {
         name: "cone",
         summary: "how far an empty cone over the surface opens, UV units per height unit, 0..1",
         source: "Dummer 2006; Ban, Valasek, Balint and Vad 2024",
-        version: 3,
+        version: 4,
         costly: true,
         form: Form::Single,
         channels: &[Channel::fixed("ratio", Range::LOWER_BOUND)],
@@ -108,7 +108,7 @@ pub static RELAXED_CONE: Map = Map {
         name: "relaxed_cone",
         summary: "how far a cone that a ray pierces at most once opens, UV units per height unit, 0..1",
         source: "Policarpo and Oliveira 2007; Ban, Valasek, Balint and Vad 2024",
-        version: 3,
+        version: 4,
         costly: true,
         form: Form::Single,
         channels: &[Channel::fixed("ratio", Range::LOWER_BOUND)],
@@ -125,8 +125,10 @@ fn plan(grid: maps::Grid, _options: &Options) -> Plan {
     Plan::single(grid).working(exact::working_bytes(grid).max(falling::working_bytes(grid)))
 }
 
-/// Relative rounding of a slope, all steps together.
-const ROUNDING: f64 = 4e-7;
+/// How much steeper than found a rise between points may be: rounding, and what the search does not tell from a tie.
+const ROUNDING: f64 = 8e-7;
+/// The same of the published relaxed cones: rounding alone.
+const ROUNDING_OF_RAYS: f64 = 4e-7;
 
 /// Ratios of empty cones, one a texel, row by row.
 ///
@@ -137,10 +139,11 @@ pub fn cone_map(
     mode: ConeMode,
     mut progress: Progress<'_>,
 ) -> Result<Vec<f32>, BakeError> {
-    Ok(ratios(match mode {
+    let slopes = match mode {
         ConeMode::Conservative => exact::steepest_rises(field, &mut progress)?,
         ConeMode::Texel => exact::steepest_between_texels(field, &mut progress)?,
-    }))
+    };
+    Ok(ratios(slopes, ROUNDING))
 }
 
 /// Ratios of cones that a ray pierces at most once, one a texel, row by row.
@@ -153,7 +156,7 @@ pub fn relaxed_cone_map(
     mut progress: Progress<'_>,
 ) -> Result<Vec<f32>, BakeError> {
     if mode == ConeMode::Texel {
-        return Ok(ratios(falling::steepest_between_texels(field, &mut progress)?));
+        return Ok(ratios(falling::steepest_between_texels(field, &mut progress)?, ROUNDING_OF_RAYS));
     }
     let rows = field.height();
     let mut half = |second: usize, done: usize, total: usize| {
@@ -161,18 +164,18 @@ pub fn relaxed_cone_map(
     };
     let empty = exact::steepest_rises(field, &mut Progress::new(&mut |done, total| half(0, done, total)))?;
     let mut second = |done, total| half(1, done, total);
-    Ok(ratios(falling::steepest_rises(field, empty, &mut Progress::new(&mut second))?))
+    Ok(ratios(falling::steepest_rises(field, empty, &mut Progress::new(&mut second))?, ROUNDING))
 }
 
-/// Slopes as the ratios of their cones.
-fn ratios(mut slopes: Vec<f32>) -> Vec<f32> {
-    slopes.par_iter_mut().for_each(|value| *value = ratio(*value));
+/// Slopes that may be steeper by `rounding`, as the ratios of their cones.
+fn ratios(mut slopes: Vec<f32>, rounding: f64) -> Vec<f32> {
+    slopes.par_iter_mut().for_each(|value| *value = ratio(*value, rounding));
     slopes
 }
 
 /// The ratio whose cone has this slope, rounded down, at most 1.
-fn ratio(slope: f32) -> f32 {
-    let exact = ((1.0 - ROUNDING) / f64::from(slope)).min(1.0);
+fn ratio(slope: f32, rounding: f64) -> f32 {
+    let exact = ((1.0 - rounding) / f64::from(slope)).min(1.0);
     let near = exact as f32;
     if f64::from(near) > exact { near.next_down() } else { near }
 }

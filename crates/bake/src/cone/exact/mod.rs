@@ -20,6 +20,7 @@
 //!
 //! The rest is branch and bound over tiles, with [`packet::Packet`] for as many apexes side by side as the processor
 //! has lanes. Tests are in single precision, with a margin; what passes them is worked out in double precision.
+//! On planes everything ties: what is steeper by rounding alone is left out, and the ratios are made that much narrower.
 
 pub(super) mod lattice;
 mod local;

@@ -7,8 +7,11 @@ use super::pairs::{to_cell, to_edge};
 
 /// What a distance may be too long by through rounding, UV units.
 const GAP_MARGIN: f32 = 1e-6;
-/// Single-precision tests ask for this part of the slope known: what they round away stays below the other part.
-const CAUTION: f32 = 1.0 - 3e-7;
+/// Single-precision tests ask for this much more than the slope known. They round by less than 5.5e-7 themselves, so what
+/// they leave out is less than 8e-7 steeper. Asked for less, they would let all of a plane through, where everything ties.
+const WORTHWHILE: f32 = 1.0 + 2.0 * f32::EPSILON;
+/// Where the gradients of a tile differ by no more than this part of them, they are worth a test of their own.
+const EVEN: f32 = 0.25;
 /// Most lanes.
 const MOST: usize = 16;
 
@@ -29,6 +32,8 @@ pub(super) struct Packet<'a, L: Lanes> {
     from: From,
     /// The first apex, as a site of the grid.
     first: [i64; 2],
+    /// Numbers of the apexes.
+    number: L::F,
     /// Middles of the apexes, from the first site, UV units.
     u: L::F,
     v: f32,
@@ -65,7 +70,9 @@ impl<'a, L: Lanes> Packet<'a, L> {
             half[axis] = 0.5 * grid.step[axis];
         }
         let mut u = [0.0; MOST];
-        for (k, u) in u.iter_mut().enumerate() {
+        let mut number = [0.0; MOST];
+        for (k, (u, number)) in u.iter_mut().zip(&mut number).enumerate() {
+            *number = k as f32;
             *u = k as f32 * grid.step[0] + half[0];
         }
         let heights = heights.map(L::load);
@@ -73,6 +80,7 @@ impl<'a, L: Lanes> Packet<'a, L> {
             grid,
             from,
             first,
+            number: L::load(&number),
             u: L::load(&u),
             v: half[1],
             half,
@@ -114,7 +122,10 @@ impl<'a, L: Lanes> Packet<'a, L> {
             let Node { tile, first, last } = grid.node(level, node);
             let place = |site: [i64; 2]| [site[0] + origin[0], site[1] + origin[1]];
             let bounds = Bounds::new(grid, tile, place(first), place(last), self.first);
-            if !L::any(self.may_rise_to(&bounds, slope)) {
+            let may_rise = self.may_rise_to(&bounds, slope);
+            if !L::any(may_rise)
+                || !L::any(may_rise & self.may_rise_along(tile, [first, last], origin, slope))
+            {
                 continue;
             }
             if level > 0 {
@@ -135,7 +146,7 @@ impl<'a, L: Lanes> Packet<'a, L> {
     /// The slopes that tests ask for.
     #[inline(always)]
     fn asked(&self) -> L::F {
-        L::load(&self.slopes) * L::splat(CAUTION)
+        L::load(&self.slopes) * L::splat(WORTHWHILE)
     }
 
     /// Lanes for which the node may hold a point to which the surface rises with more than `slope`: neither the
@@ -166,6 +177,45 @@ impl<'a, L: Lanes> Packet<'a, L> {
         let from_a = (level - self.heights[0]) * length - along;
         let from_b = (level - self.heights[1]) * length + along;
         near & L::le(slope * square, L::max(from_a, from_b) + tilt_x + tilt_y)
+    }
+
+    /// Lanes for which a node may hold a point to which the surface rises with more than `slope`, by its gradients.
+    ///
+    /// As [`Self::may_rise_to`] with `p` along the mean gradient: from the node's first corner on, `h - p . y` grows by no
+    /// more than the greatest gradients allow. On a plane that leaves nothing, wherever the node lies.
+    #[inline(always)]
+    fn may_rise_along(
+        &self,
+        tile: &Tile,
+        [first, last]: [[i64; 2]; 2],
+        origin: [i64; 2],
+        slope: L::F,
+    ) -> L::M {
+        let steep = (tile.slope[0] * tile.slope[0] + tile.slope[1] * tile.slope[1]).sqrt();
+        let [least, most] = tile.gradient;
+        let range = (most[0] - least[0]).max(most[1] - least[1]);
+        // Points that are compared one by one have no surface between them.
+        if self.grid.extent == 0.0 || steep <= 0.0 || range > EVEN * steep {
+            return L::first(L::WIDTH);
+        }
+        let (step, zero) = (self.grid.step, L::splat(0.0));
+        let p = tile.slope.map(|component| L::splat(component / steep) * slope);
+        let size = |axis: usize| (last[axis] - first[axis] + 1) as f32 * step[axis];
+        let spread = L::max(L::splat(most[0]) - p[0], zero) * L::splat(size(0))
+            + L::max(L::splat(most[1]) - p[1], zero) * L::splat(size(1));
+        // Whole numbers are exact, so close corners are seen as sharply as far ones.
+        let corner = [0, 1].map(|axis| (first[axis] + origin[axis] - self.first[axis]) as f32);
+        let run = p[0] * ((L::splat(corner[0]) - self.number) * L::splat(step[0]))
+            + p[1] * L::splat(corner[1] * step[1]);
+        let height = L::splat(self.grid.heights([first[0] as usize, first[1] as usize])[0]);
+        let begin = L::lt(run, (height - self.heights[0]) + spread);
+        match self.from {
+            From::Edges(axis) => {
+                let run = run - p[axis] * L::splat(step[axis]);
+                begin | L::lt(run, (height - self.heights[1]) + spread)
+            }
+            From::Points | From::Texels => begin,
+        }
     }
 
     /// Tries the cells of a tile; tells whether one was steeper. As [`Self::may_rise_to`], the maximum of a

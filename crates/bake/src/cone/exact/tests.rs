@@ -28,7 +28,7 @@ fn all_instruction_sets_find_the_same() {
             for &level in Level::available() {
                 for (slope, expected) in found(level).iter().zip(&expected) {
                     // Packets of other widths look in another order, and drop what is no more than this steeper.
-                    assert!((slope / expected - 1.0).abs() <= 6e-7, "{level:?}: {slope}, {expected}");
+                    assert!((slope / expected - 1.0).abs() <= 8e-7, "{level:?}: {slope}, {expected}");
                 }
             }
         }
