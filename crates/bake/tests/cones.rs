@@ -188,29 +188,46 @@ fn relaxed_cones_are_wider_on_smooth_slopes() {
 
 /// The steepest rise from around a texel to where the surface falls outwards, among points half a texel apart;
 /// those on borders between cells count a little farther out.
+///
+/// Past the border of a clamped map the surface is level across it, so that on a way straight to the border the least turn
+/// aside decides whether it falls there: those ways are looked at as well, turned by next to nothing.
 fn falling(field: &HeightField, [i, j]: [i64; 2]) -> f64 {
     let size = [field.width() as i64, field.height() as i64];
     let half = size.map(|n| 0.5 / n as f64);
     let place = |at: [i64; 2]| [at[0] as f64 * half[0], at[1] as f64 * half[1]];
     let middle = [i, j].map(|at| 2 * at + 1);
-    let from = (0..25).map(|k| place([middle[0] + k % 5 - 2, middle[1] + k / 5 - 2]));
-    let from: Vec<_> = from.map(|x| (x, height(field, x))).collect();
+    let from: Vec<_> = (0..25).map(|k| place([middle[0] + k % 5 - 2, middle[1] + k / 5 - 2])).collect();
     let mut steepest = 1.0_f64;
-    let reach = size.map(|n| n * 3 / 2);
+    let mut look = |x: [f64; 2], low: f64, y: [f64; 2], high: f64| {
+        let (u, v, rise) = (y[0] - x[0], y[1] - x[1], high - low);
+        if rise > 0.0 && rise * rise > steepest * steepest * (u * u + v * v) {
+            let away = u.hypot(v);
+            let behind = [y[0] + 1e-6 * u / away, y[1] + 1e-6 * v / away];
+            if height(field, behind) < high {
+                steepest = rise / away;
+            }
+        }
+    };
+    if field.wrap() == Wrap::Clamp {
+        for &x in &from {
+            for (axis, border) in [(0, half[0]), (0, 1.0 - half[0]), (1, half[1]), (1, 1.0 - half[1])] {
+                for aside in [-1e-4, 1e-4] {
+                    let mut y = x;
+                    y[axis] = border;
+                    y[1 - axis] += aside * half[1 - axis];
+                    look(x, height(field, x), y, height(field, y));
+                }
+            }
+        }
+    }
+    let from: Vec<_> = from.into_iter().map(|x| (x, height(field, x))).collect();
+    // In half texels: all of a clamped map, and more than half a period of the others.
+    let reach = size.map(|n| if field.wrap() == Wrap::Clamp { 2 * n } else { n * 3 / 2 });
     for b in middle[1] - reach[1]..=middle[1] + reach[1] {
         for a in middle[0] - reach[0]..=middle[0] + reach[0] {
             let y = place([a, b]);
             let high = height(field, y);
-            for (x, low) in &from {
-                let (u, v, rise) = (y[0] - x[0], y[1] - x[1], high - low);
-                if rise > 0.0 && rise * rise > steepest * steepest * (u * u + v * v) {
-                    let away = u.hypot(v);
-                    let behind = [y[0] + 1e-6 * u / away, y[1] + 1e-6 * v / away];
-                    if height(field, behind) < high {
-                        steepest = rise / away;
-                    }
-                }
-            }
+            from.iter().for_each(|&(x, low)| look(x, low, y, high));
         }
     }
     steepest
@@ -233,7 +250,7 @@ fn relaxed_cones_are_nearly_as_wide_as_they_may_be_on_smooth_ground() {
             .collect();
         narrower.sort_by(f64::total_cmp);
         println!("{wrap:?}: narrower by {narrower:.4?}");
-        assert!(narrower[8] < 0.01, "{wrap:?}");
+        assert!(narrower[8] < 0.01 && narrower[15] < 0.04, "{wrap:?}");
     }
 }
 
