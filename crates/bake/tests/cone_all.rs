@@ -60,7 +60,7 @@ impl Surface {
     }
 
     /// The steepest rise from a centre.
-    fn from_centre(&self, from: [i64; 2]) -> f64 {
+    fn rise_of_centre(&self, from: [i64; 2]) -> f64 {
         let (n, low) = (self.n as f64, self.height(from));
         let place = |[x, y]: [i64; 2]| [from[0] + x, from[1] + y];
         let mut best = 0.0_f64;
@@ -140,7 +140,7 @@ impl Surface {
     }
 
     /// The steepest rise from inside the edge from a centre to the next along an axis, to a centre beside it.
-    fn from_edge(&self, from: [i64; 2], axis: usize) -> f64 {
+    fn rise_of_edge(&self, from: [i64; 2], axis: usize) -> f64 {
         let n = self.n as f64;
         let mut to = from;
         to[axis] += 1;
@@ -195,8 +195,8 @@ impl Surface {
         let all = |f: &(dyn Fn([i64; 2]) -> f64 + Sync)| -> Vec<f64> {
             places.par_iter().map(|&place| f(place)).collect()
         };
-        let centres = all(&|place| self.from_centre(place));
-        let edges = [all(&|place| self.from_edge(place, 0)), all(&|place| self.from_edge(place, 1))];
+        let centres = all(&|place| self.rise_of_centre(place));
+        let edges = [all(&|place| self.rise_of_edge(place, 0)), all(&|place| self.rise_of_edge(place, 1))];
         let ratio = |&[i, j]: &[i64; 2]| {
             let mut most = self.gradients([i, j]).max(1.0);
             for [x, y] in (-1..=1).flat_map(|y| (-1..=1).map(move |x| [x, y])) {

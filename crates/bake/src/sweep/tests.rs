@@ -61,11 +61,11 @@ fn worst(field: &HeightField, direction: [f64; 2], level: Level) -> f64 {
             let Some((from, last)) = plan.receivers(at) else { continue };
             let end = plan.end(at, last);
             let samples = line(field, &sweep, at, end);
-            for step in from..=last {
+            for (step, seen) in out.iter().enumerate().take(last + 1).skip(from) {
                 let own = samples.iter().find(|sample| sample.0 == step as f64).unwrap().1;
                 let far = samples.iter().filter(|sample| sample.0 >= (step + FAR_FROM) as f64);
                 let rise = far.map(|s| (s.1 - own) / (s.0 - step as f64)).fold(0.0, f64::max);
-                worst = worst.max((rise - f64::from(out[step].rises[lane].max(0.0))).abs());
+                worst = worst.max((rise - f64::from(seen.rises[lane].max(0.0))).abs());
             }
         }
     }
