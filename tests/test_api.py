@@ -20,7 +20,7 @@ import pytest
 import bumpwgpu as bw
 from bumpwgpu import _bumpwgpu, techniques
 from bumpwgpu.baking import MAPS
-from bumpwgpu.rendering import AOVS, SKIPS
+from bumpwgpu.rendering import AOVS, SKIP_CODES, SKIPS
 
 PACKAGE = Path(bw.__file__).parent
 MODULES = sorted(
@@ -53,11 +53,11 @@ SIGNATURES = {
     "Material": "height albedo normal * specular shininess normal_convention double_sided",
     "render": (
         "mesh material * camera lights technique size shadows silhouettes samples specular_aa aovs skip "
-        "device ambient background"
+        "skip_error device ambient background"
     ),
     "Renderer": (
         "mesh material * camera lights technique size shadows silhouettes samples specular_aa aovs skip "
-        "device ambient background"
+        "skip_error device ambient background"
     ),
     "Renderer.render": "self camera",
     "Renderer.render_many": "self cameras",
@@ -221,6 +221,7 @@ def test_names_agree_with_the_core() -> None:
     assert [entry["name"] for entry in _bumpwgpu.map_registry()] == list(MAPS)
     assert tuple(_bumpwgpu.aov_names()) == AOVS
     assert tuple(_bumpwgpu.skip_names()) == SKIPS
+    assert dict(_bumpwgpu.skip_codes()) == SKIP_CODES
 
 
 def python(code: str) -> str:

@@ -210,6 +210,7 @@ def _shoot(scene: Scene, camera: Camera, technique: Technique, aovs: tuple[str, 
             size=scene.size,
             shadows=None if scene.shadows else False,
             aovs=aovs,
+            skip=False,  # errors and times are those of the technique itself
         )
 
 

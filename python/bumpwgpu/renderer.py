@@ -53,6 +53,8 @@ class Renderer:
         Additional outputs.
     skip : bool or iterable of str, default True
         What to leave out where the picture does not need it.
+    skip_error : (float, float), default (0.125, 0.25)
+        How far what is seen may be off for it, in texels and in pixels.
     device : {"auto", "gpu"}
         The Vulkan device.
     ambient : float or (float, float, float), default 0.1
@@ -90,6 +92,7 @@ class Renderer:
         specular_aa: bool = True,
         aovs: str | Iterable[str] = (),
         skip: bool | str | Iterable[str] = True,
+        skip_error: tuple[float, float] = (0.125, 0.25),
         device: str = "auto",
         ambient: float | tuple[float, float, float] = 0.1,
         background: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0),
@@ -107,6 +110,7 @@ class Renderer:
             specular_aa=specular_aa,
             aovs=aovs,
             skip=skip,
+            skip_error=skip_error,
             device=device,
             ambient=ambient,
             background=background,

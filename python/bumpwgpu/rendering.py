@@ -25,7 +25,7 @@ from .techniques import Technique, get
 if TYPE_CHECKING:
     from PIL import Image
 
-__all__ = ["AOVS", "SKIPS", "Frame", "HorizonShadows", "render"]
+__all__ = ["AOVS", "SKIPS", "SKIP_CODES", "Frame", "HorizonShadows", "render"]
 
 #: Additional outputs.
 AOVS: tuple[str, ...] = (
@@ -39,6 +39,7 @@ AOVS: tuple[str, ...] = (
     "mask",
     "ray_start",
     "ray_delta",
+    "skip",
 )
 #: Kinds of work that a picture may not need.
 SKIPS: tuple[str, ...] = (
@@ -46,7 +47,20 @@ SKIPS: tuple[str, ...] = (
     "backface",
     "occlusion",
     "depth_first",
+    "flat",
+    "parallax",
+    "range",
+    "shadow",
 )
+#: What stands for each kind in the output "skip", to be added up; "normal" besides "parallax" where what is
+#: seen stays on the mesh. From 65536 on, the number of shadow rays left out of the pixel.
+SKIP_CODES: dict[str, int] = {
+    "flat": 16,
+    "parallax": 32,
+    "range": 64,
+    "shadow": 128,
+    "normal": 256,
+}
 #: Longest side of a picture, in pixels.
 MAX_SIDE = 1 << 16
 
@@ -215,6 +229,7 @@ def render(
     specular_aa: bool = True,
     aovs: str | Iterable[str] = (),
     skip: bool | str | Iterable[str] = True,
+    skip_error: tuple[float, float] = (0.125, 0.25),
     device: str = "auto",
     ambient: float | tuple[float, float, float] = 0.1,
     background: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0),
@@ -258,12 +273,18 @@ def render(
         units, inf where nothing is), "position" (float32 as the others: half a
         millimetre off at 10 km where lengths are metres), "normal" (world axes), "height" (0..1), "steps",
         "shadow" (share of the lights that the relief hides), "mask" (1 where there is anything),
-        "ray_start" and "ray_delta" (the segment searched, texture space).
+        "ray_start" and "ray_delta" (the segment searched, texture space), "skip" (what was left out of a
+        pixel, by :data:`bumpwgpu.rendering.SKIP_CODES`).
     skip : bool or iterable of str, default True
         What to leave out where the picture does not need it: all of it, nothing, or some of
         :data:`bumpwgpu.rendering.SKIPS`. ``frame.stats["skipped"]`` counts what was left out: triangles
         outside the picture ("frustum"), facing away ("backface") and behind walls ("occlusion"), draws
-        moved ahead of what they hide ("depth_first").
+        moved ahead of what they hide ("depth_first"); pixels on flat ground ("flat"), with no visible
+        parallax ("parallax") or marched over less of their ray ("range"); shadow rays that hide no light
+        ("shadow").
+    skip_error : (float, float), default (0.125, 0.25)
+        How far what is seen may be off where a march is left out, in texels of the height map and in pixels
+        measured on the mesh; whichever is more counts. (0, 0) leaves out what changes nothing.
     device : {"auto", "gpu"}
         Both render on the Vulkan device; the environment variable ``BUMPWGPU_ADAPTER`` picks one by
         a part of its name.
@@ -310,6 +331,7 @@ def render(
         specular_aa=specular_aa,
         aovs=aovs,
         skip=skip,
+        skip_error=skip_error,
         device=device,
         ambient=ambient,
         background=background,
@@ -334,6 +356,7 @@ def prepared(
     specular_aa: Any,
     aovs: Any,
     skip: Any,
+    skip_error: Any,
     device: Any,
     ambient: Any,
     background: Any,
@@ -369,6 +392,7 @@ def prepared(
         flag("specular_aa", specular_aa),
         outputs,
         _skips(skip),
+        _skip_error(skip_error),
     )
     texts = []
     used = {used for part in instances for *_, used in part._draws}
@@ -415,6 +439,11 @@ def _skips(skip: Any) -> list[str]:
     if isinstance(skip, bool | np.bool_):
         return list(SKIPS) if skip else []
     return strings("skip", skip, SKIPS)
+
+
+def _skip_error(error: Any) -> tuple[float, float]:
+    texels, pixels = numbers("skip_error", error, 2, low=0.0)
+    return texels, pixels
 
 
 def _size(size: Any) -> tuple[int, int]:

@@ -5,7 +5,10 @@ struct DrawInfo {
     relative_from_object: mat4x4f,   // to camera-relative world space
     object_from_relative: mat4x4f,   // its inverse; transposed, it takes normals to world space
     eye: vec4f,                      // camera, object space; w is 1
-    own: vec4u,                      // x: its number among the instances that cast shadows, y: of its solid
+    most_heights: vec3f,             // times the way from the eye: heights that a hit may be off
+    most_texels: f32,                // texels that it may be off in place of that
+    span: vec2f,                     // the lowest and the highest point of the map
+    own: vec2u,                      // its number among the instances that cast shadows, and of its solid
 }
 
 // A storage buffer: Mesa 22.3 crashes over loops whose ends depend on a matrix in a uniform, as those do that trace

@@ -47,7 +47,7 @@ fn fragment(in: Varyings) -> ReliefTargets {
 
     var out: ReliefTargets;
     out.color = displayable(light.color);
-    out.trace = pack_trace(TRACE_COVERED | TRACE_MARCHED, hit.status, light.shadow_rays, hit.steps);
+    out.trace = pack_trace(TRACE_COVERED | TRACE_MARCHED | light.trace, hit.status, light.shadow_rays, hit.steps);
     out.place = vec4f(point.uv, depth, point.height);
     out.position = vec4f(relative, light.blocked);
     out.normal = vec4f(normal, 0.0);

@@ -13,6 +13,9 @@ struct MarchSegment {
     // End minus start.
     delta: vec3f,
     unused: f32,
+    // The part of it that can meet the surface, from 0 to 1.
+    stretch: vec2f,
+    unused_too: vec2f,
 }
 
 struct MarchResult {
@@ -36,10 +39,10 @@ fn march(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) grou
     }
     let segment = segments[index];
     if shadow_rays {
-        let blocked = occluded(segment.start, segment.delta, segment.cos_theta);
+        let blocked = occluded(segment.start, segment.delta, segment.cos_theta, segment.stretch);
         results[index] = MarchResult(1.0, select(1u, 0u, blocked), 0u, 0u);
     } else {
-        let found = search(segment.start, segment.delta, segment.cos_theta);
+        let found = search(segment.start, segment.delta, segment.cos_theta, segment.stretch);
         results[index] = MarchResult(found.tau, found.status, found.steps, 0u);
     }
 }

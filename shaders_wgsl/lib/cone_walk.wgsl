@@ -9,10 +9,12 @@
 #import "lib/cell_walk.wgsl"
 #import "bindings/cone.wgsl"
 
-// With `relaxed` the buffer holds the relaxed cones behind the empty ones.
-fn walk(start: vec3f, delta: vec3f, from_surface: bool, most_steps: i32, relaxed: bool, halvings: i32) -> Found {
-    // At most 2. Mesa 22.3 compiles anew for each picture what branches on uniforms only; see shading/branches.wgsl.
-    let periodic = min(height_info.wrap, arrayLength(&corners)) != 1u;
+// With `relaxed` the buffer holds the relaxed cones behind the empty ones. stretch: what of the segment can meet the
+// surface.
+fn walk(
+    start: vec3f, delta: vec3f, from_surface: bool, most_steps: i32, relaxed: bool, halvings: i32, stretch: vec2f,
+) -> Found {
+    let periodic = cell_wrap() != 1u;
     let direction = vec3f(delta.xy * height_info.size, delta.z);
     let dz = direction.z;
     if !(max(abs(direction.x), abs(direction.y)) < FARTHEST) {
@@ -25,7 +27,12 @@ fn walk(start: vec3f, delta: vec3f, from_surface: bool, most_steps: i32, relaxed
     let pierces = relaxed && dz <= 0.0;
     let layer = select(0u, (height_info.cells.x + 1u) * (height_info.cells.y + 1u), pierces);
     var z_start = start.z;
-    var t = 0.0;
+    var t = stretch.x;
+    if t > 0.0 {
+        let at_start = vec2i(walk_axis_place(x, t), walk_axis_place(y, t));
+        x.cell = at_start.x;
+        y.cell = at_start.y;
+    }
     // Up to here the ray is followed cell by cell.
     var closed_until = 0.0;
     for (var i = 1; i <= most_steps; i++) {
@@ -97,7 +104,7 @@ fn walk(start: vec3f, delta: vec3f, from_surface: bool, most_steps: i32, relaxed
             }
         }
         // A falling ray meets the floor; the others end with their segment.
-        if t >= NEVER || (dz >= 0.0 && t > 1.0) {
+        if t >= NEVER || (dz >= 0.0 && t > stretch.y) {
             return found_left(steps);
         }
     }

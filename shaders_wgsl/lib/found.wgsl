@@ -1,5 +1,10 @@
 // What a search returns. Twin of `Found` in crates/heightfield/src/ray.rs.
 
+// The whole of a segment: what a search is told when nothing is known of the ground.
+const WHOLE_STRETCH: vec2f = vec2f(0.0, 1.0);
+// What `slack` says of a technique that does not march: more than any range of heights.
+const NO_MARCH: f32 = 1e9;
+
 struct Found {
     // Position along the segment: 0 at its start, 1 at its end.
     tau: f32,

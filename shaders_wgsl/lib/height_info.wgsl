@@ -23,5 +23,6 @@ struct HeightInfo {
     highest: f32,
     // A depth of n nodes starts at offset_bits & (n - 1) in the skip pyramid.
     offset_bits: u32,
-    unused: u32,
+    // Finest depth of the quadtree of bounds.
+    bounds_depth: u32,
 }

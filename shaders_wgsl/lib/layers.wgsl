@@ -22,30 +22,33 @@ fn gap_at(start: vec3f, delta: vec3f, tau: f32) -> f32 {
 
 // Samples the end of each of `layers` equal layers until one lies on or below the surface. The start
 // is not sampled: on the lid nothing is above it. The floor counts as below whatever the rounding.
-fn first_below(start: vec3f, delta: vec3f, layers: i32) -> Bracket {
-    var above = 0.0;
+// clear: up to here the segment is known to lie above the surface; the layers that end before are taken as read.
+fn first_below(start: vec3f, delta: vec3f, layers: i32, clear: f32) -> Bracket {
+    let first = clamp(i32(clear * f32(layers)), 1, layers);
+    var above = f32(first - 1) / f32(layers);
     var gap_above = 0.0;
-    for (var i = 1; i <= layers; i++) {
+    for (var i = first; i <= layers; i++) {
         let tau = f32(i) / f32(layers);
         let gap = gap_at(start, delta, tau);
         if gap <= 0.0 || (i == layers && delta.z < 0.0) {
-            if i == 1 {
-                gap_above = max(gap_at(start, delta, 0.0), 0.0);
+            if i == first {
+                gap_above = max(gap_at(start, delta, above), 0.0);
             }
-            return Bracket(true, above, tau, gap_above, min(gap, 0.0), u32(i));
+            return Bracket(true, above, tau, gap_above, min(gap, 0.0), u32(i - first + 1));
         }
         above = tau;
         gap_above = gap;
     }
-    return Bracket(false, above, 1.0, gap_above, gap_above, u32(layers));
+    return Bracket(false, above, 1.0, gap_above, gap_above, u32(layers - first + 1));
 }
 
 // Whether any sample of a segment that leaves the surface lies strictly below it. A start below the
 // surface is lifted onto it: searches that stop at a layer return hits up to a layer too deep, and from
-// there a surface would shadow itself.
-fn any_below(start: vec3f, delta: vec3f, layers: i32) -> bool {
+// there a surface would shadow itself. until: from here on nothing is as high as the segment.
+fn any_below(start: vec3f, delta: vec3f, layers: i32, until: f32) -> bool {
     let lift = vec3f(0.0, 0.0, max(height_at(start.xy) - start.z, 0.0));
-    for (var i = 1; i <= layers; i++) {
+    let last = min(i32(ceil(until * f32(layers))), layers);
+    for (var i = 1; i <= last; i++) {
         if gap_at(start + lift, delta - lift, f32(i) / f32(layers)) < 0.0 {
             return true;
         }

@@ -28,8 +28,18 @@ fn targets(shaded: Shaded) -> Targets {
 
 const TRACE_COVERED: u32 = 0x80000000u;
 const TRACE_MARCHED: u32 = 0x40000000u;
+// Not marched: in place of a status, why.
+const TRACE_FLAT: u32 = 0x10000000u;
+const TRACE_PARALLAX: u32 = 0x20000000u;
+const TRACE_ON_MESH: u32 = 0x30000000u;
+// Marched over a part of the segment.
+const TRACE_RANGE: u32 = 0x80000u;
+// Shadow rays are cast: one a light, but for those that were left out.
+const TRACE_SHADOWED: u32 = 0x40000u;
+const MOST_STEPS: u32 = 0x3ffffu;
 
-// Bit 31 covered, 30 marched, 28-29 status, 20-27 shadow rays, 0-19 steps; numbers saturate.
+// Bit 31 covered, 30 marched, 28-29 status or why not marched, 20-27 shadow rays, 18-19 flags, 0-17 steps; numbers
+// saturate.
 fn pack_trace(flags: u32, status: u32, shadow_rays: u32, steps: u32) -> u32 {
-    return flags | (min(status, 3u) << 28u) | (min(shadow_rays, 255u) << 20u) | min(steps, 0xfffffu);
+    return flags | (min(status, 3u) << 28u) | (min(shadow_rays, 255u) << 20u) | min(steps, MOST_STEPS);
 }

@@ -1,13 +1,14 @@
 // Bisection over the whole segment without a linear phase: finds a crossing, not the first.
 // Policarpo, Oliveira and Comba 2005 (refinement alone).
 //
-// start, delta: texture-space segment (u, v, z); cos_theta: cosine between ray and normal.
+// start, delta: texture-space segment (u, v, z); cos_theta: cosine between ray and normal; stretch: the part of the
+// segment that can meet the surface.
 // Twin of crates/heightfield/src/search/binary.rs.
 #import "lib/layers.wgsl"
 
 override steps: i32 = 16;
 
-fn search(start: vec3f, delta: vec3f, cos_theta: f32) -> Found {
+fn search(start: vec3f, delta: vec3f, cos_theta: f32, stretch: vec2f) -> Found {
     var above = 0.0;
     var below = 1.0;
     var found = delta.z < 0.0;
@@ -26,7 +27,7 @@ fn search(start: vec3f, delta: vec3f, cos_theta: f32) -> Found {
     return found_hit(below, u32(steps));
 }
 
-fn occluded(start: vec3f, delta: vec3f, cos_theta: f32) -> bool {
+fn occluded(start: vec3f, delta: vec3f, cos_theta: f32, stretch: vec2f) -> bool {
     // Halving towards the surface; closer than 1/256 the surface shadows itself by rounding.
     var far = 1.0;
     for (var i = 0; i < min(steps, 8); i++) {
@@ -36,4 +37,9 @@ fn occluded(start: vec3f, delta: vec3f, cos_theta: f32) -> bool {
         }
     }
     return false;
+}
+
+// How far outside of the heights that it met a hit may lie: what halving leaves.
+fn slack(cos_theta: f32) -> f32 {
+    return exp2(-f32(steps));
 }

@@ -1,18 +1,24 @@
 // The same walk as cone.wgsl with the published cone map, interpolated between texels: what its cones cut
 // off the surface is missed. Dummer 2006.
 //
-// start, delta: texture-space segment (u, v, z); cos_theta: cosine between ray and normal.
+// start, delta: texture-space segment (u, v, z); cos_theta: cosine between ray and normal; stretch: the part of the
+// segment that can meet the surface.
 // Twin of crates/heightfield/src/search/cone_texel.rs.
 #import "lib/cone_walk.wgsl"
 #import "lib/cone_by_corner.wgsl"
 
 override steps: i32 = 16384;
 
-fn search(start: vec3f, delta: vec3f, cos_theta: f32) -> Found {
-    return walk(start, delta, false, steps, false, 0);
+fn search(start: vec3f, delta: vec3f, cos_theta: f32, stretch: vec2f) -> Found {
+    return walk(start, delta, false, steps, false, 0, WHOLE_STRETCH);
 }
 
-fn occluded(start: vec3f, delta: vec3f, cos_theta: f32) -> bool {
-    let found = walk(start, delta, true, steps, false, 0);
+fn occluded(start: vec3f, delta: vec3f, cos_theta: f32, stretch: vec2f) -> bool {
+    let found = walk(start, delta, true, steps, false, 0, stretch);
     return found.status == 0u && found.tau <= 1.0;
+}
+
+// How far outside of the heights that it met a hit may lie: anywhere below a feature it has missed.
+fn slack(cos_theta: f32) -> f32 {
+    return 1.0;
 }

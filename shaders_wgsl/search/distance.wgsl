@@ -1,7 +1,8 @@
 // Sphere tracing through a distance map: each step goes as far as the ball around the ray is empty, or to the
 // cell's wall after the bilinear cell was solved in closed form. Donnelly 2005 (GPU Gems 2, chapter 8).
 //
-// start, delta: texture-space segment (u, v, z); cos_theta: cosine between ray and normal.
+// start, delta: texture-space segment (u, v, z); cos_theta: cosine between ray and normal; stretch: the part of the
+// segment that can meet the surface.
 // Twin of crates/heightfield/src/search/distance.rs.
 #import "lib/found.wgsl"
 #import "lib/cell_walk.wgsl"
@@ -11,11 +12,6 @@ override steps: i32 = 16384;
 
 // What rounding of the position costs a step, as a share of the way that the ray came, and of the step.
 const DRIFT: f32 = 9.5e-7;
-
-// At most 2. Mesa 22.3 compiles anew for each picture what branches on uniforms only; see shading/branches.wgsl.
-fn cell_wrap() -> u32 {
-    return min(height_info.wrap, arrayLength(&corners));
-}
 
 // The texel of `n` whose footprint holds a point of a cell.
 fn footprint(cell: u32, local: f32, n: i32) -> i32 {
@@ -41,7 +37,8 @@ fn least_distance(cell: vec2u, local: vec2f, z: f32) -> f32 {
     return f32(code) * distances.info.unit;
 }
 
-fn trace(start: vec3f, delta: vec3f, from_surface: bool) -> Found {
+// stretch: what of the segment can meet the surface.
+fn trace(start: vec3f, delta: vec3f, from_surface: bool, stretch: vec2f) -> Found {
     let periodic = cell_wrap() != 1u;
     let direction = vec3f(delta.xy * height_info.size, delta.z);
     let dz = direction.z;
@@ -53,7 +50,12 @@ fn trace(start: vec3f, delta: vec3f, from_surface: bool) -> Found {
     var y = walk_axis_new(position.y, direction.y, height_info.cells.y, periodic);
     let inverse_speed = 1.0 / max(length(delta * distances.info.metric), 1e-30);
     var z_start = start.z;
-    var t = 0.0;
+    var t = stretch.x;
+    if t > 0.0 {
+        let at_start = vec2i(walk_axis_place(x, t), walk_axis_place(y, t));
+        x.cell = at_start.x;
+        y.cell = at_start.y;
+    }
     for (var i = 1; i <= steps; i++) {
         let ray = ray_in_cell(x, y, z_start + dz * t, t, direction);
         var gap = ray.gap;
@@ -89,19 +91,24 @@ fn trace(start: vec3f, delta: vec3f, from_surface: bool) -> Found {
             }
         }
         // A falling ray meets the floor; the others end with their segment.
-        if t >= NEVER || (dz >= 0.0 && t > 1.0) {
+        if t >= NEVER || (dz >= 0.0 && t > stretch.y) {
             return found_left(u32(i));
         }
     }
     return found_unconverged(min(t, 1.0), u32(steps));
 }
 
-fn search(start: vec3f, delta: vec3f, cos_theta: f32) -> Found {
-    return trace(start, delta, false);
+fn search(start: vec3f, delta: vec3f, cos_theta: f32, stretch: vec2f) -> Found {
+    return trace(start, delta, false, stretch);
 }
 
-fn occluded(start: vec3f, delta: vec3f, cos_theta: f32) -> bool {
-    let found = trace(start, delta, true);
+fn occluded(start: vec3f, delta: vec3f, cos_theta: f32, stretch: vec2f) -> bool {
+    let found = trace(start, delta, true, stretch);
     // What lies beyond the light throws no shadow.
     return found.status == 0u && found.tau <= 1.0;
+}
+
+// How far outside of the heights that it met a hit may lie: on the surface, or it is none.
+fn slack(cos_theta: f32) -> f32 {
+    return 0.0;
 }

@@ -6,11 +6,13 @@
 // id; a ray that enters one on or below its surface hits it there, which closes the seam that rounding
 // leaves between neighbours. There are no branches: lanes in lock step would all pay for each.
 //
-// start, delta: texture-space segment (u, v, z); cos_theta: cosine between ray and normal.
+// start, delta: texture-space segment (u, v, z); cos_theta: cosine between ray and normal; stretch: the part of the
+// segment that can meet the surface.
 // Gives the answers of crates/heightfield/src/search/exact.rs.
 #import "lib/found.wgsl"
 #import "lib/bilinear.wgsl"
 #import "lib/ray_end.wgsl"
+#import "lib/surface_height.wgsl"
 #import "bindings/pyramid.wgsl"
 
 // Mesa's software device ends all loops of a program after 65535 rounds, whatever state they are in.
@@ -32,8 +34,9 @@ fn maximum_of(raw: vec2i, bits: vec2i, offset_bits: i32) -> f32 {
     return maximum_at(offset + (id.y << u32(bits.x)) + id.x);
 }
 
-// bounded: whether the segment ends at its end; otherwise it goes on to the surface below.
-fn trace(start: vec3f, delta: vec3f, from_surface: bool, bounded: bool) -> Found {
+// bounded: whether the segment ends at its end; otherwise it goes on to the surface below. stretch: what of the
+// segment can meet the surface.
+fn trace(start: vec3f, delta: vec3f, from_surface: bool, bounded: bool, stretch: vec2f) -> Found {
     let period = vec2f(height_info.cells);
     let place = start.xy * height_info.size - 0.5;
     let first_cell = floor(place);
@@ -71,16 +74,16 @@ fn trace(start: vec3f, delta: vec3f, from_surface: bool, bounded: bool) -> Found
         depth = deepest;
     }
     if from_surface || bounded {
-        end = min(end, 1.0);
+        end = min(end, stretch.y);
     }
-    if bounded {
+    if bounded || stretch.x > 0.0 {
         // Nodes about as wide as the segment is long.
-        let cells = max(abs(direction.x), abs(direction.y));
+        let cells = max(abs(direction.x), abs(direction.y)) * select(stretch.y - stretch.x, 1.0, bounded);
         depth = clamp(deepest - i32(log2(max(cells, 1.0))), depth, deepest);
     }
     // Nodes are left out only when the ray clears them by more than rounding.
     let z_skip = z_start - ROUNDING;
-    var t = max(0.0, (height_info.highest - z_skip) * fall);
+    var t = max(stretch.x, (height_info.highest - z_skip) * fall);
     var hit = false;
     var steps = 0u;
     loop {
@@ -156,20 +159,29 @@ fn trace(start: vec3f, delta: vec3f, from_surface: bool, bounded: bool) -> Found
     return found_left(steps);
 }
 
-fn search(start: vec3f, delta: vec3f, cos_theta: f32) -> Found {
-    return trace(start, delta, false, false);
+fn search(start: vec3f, delta: vec3f, cos_theta: f32, stretch: vec2f) -> Found {
+    return trace(start, delta, false, false, stretch);
 }
 
-fn occluded(start: vec3f, delta: vec3f, cos_theta: f32) -> bool {
-    return trace(start, delta, true, false).status == 0u;
+fn occluded(start: vec3f, delta: vec3f, cos_theta: f32, stretch: vec2f) -> bool {
+    return trace(start, delta, true, false, stretch).status == 0u;
+}
+
+fn height_at(uv: vec2f) -> f32 {
+    return surface_height(uv);
 }
 
 // As search, for a segment that may begin and end anywhere.
 fn search_within(start: vec3f, delta: vec3f) -> Found {
-    return trace(start, delta, false, true);
+    return trace(start, delta, false, true, WHOLE_STRETCH);
 }
 
 // The same for one that begins on the surface and leaves it.
 fn search_away_within(start: vec3f, delta: vec3f) -> Found {
-    return trace(start, delta, true, true);
+    return trace(start, delta, true, true, WHOLE_STRETCH);
+}
+
+// How far outside of the heights that it met a hit may lie: on the surface, or it is none.
+fn slack(cos_theta: f32) -> f32 {
+    return 0.0;
 }

@@ -1,6 +1,7 @@
 // The march of one fragment: from the mesh surface to the hit, its normal and its light.
 #import "lib/found.wgsl"
 #import "lib/texture_ray.wgsl"
+#import "shading/approach.wgsl"
 #import "shading/shadow_search.wgsl"
 #import "shading/branches.wgsl"
 #import "shading/relief_targets.wgsl"
@@ -16,14 +17,23 @@ fn shade_relief(position: vec3f, point: SurfacePoint) -> ReliefTargets {
     let direction = position - draw.eye.xyz;
     let ray = texture_ray(
         point.surface, direction, point.uv, material.scale, material.base, tile_period());
-    // Pixels drawn only for their neighbours' derivatives may read zeros from buffers, the 1 behind the eye among
-    // them. Marched, they would follow a wrong ray over ground of height 0 for as long as the search lets them.
+    let need = approach(ray, direction, slack(ray.cos_theta));
     var found = found_left(0u);
-    if draw.eye.w != 0.0 {
-        found = search(ray.start, ray.delta, ray.cos_theta);
+    if need.spared {
+        let tau = clamp((ray.start.z - need.z) / max(-ray.delta.z, 1e-30), 0.0, 1.0);
+        found = found_hit(tau, 1u);
+    } else if draw.eye.w != 0.0 {
+        // Pixels drawn only for their neighbours' derivatives may read zeros from buffers, the 1 behind the eye among
+        // them. Marched, they would follow a wrong ray over ground of height 0 for as long as the search lets them.
+        found = search(ray.start, ray.delta, ray.cos_theta, need.stretch);
     }
 
-    let hit = ray.start + ray.delta * found.tau;
+    var hit = ray.start + ray.delta * found.tau;
+    if need.spared {
+        // On the surface that is there; its distance is where the ray has that height.
+        hit.z = height_at(hit.xy);
+        found.tau = clamp((ray.start.z - hit.z) / max(-ray.delta.z, 1e-30), 0.0, 1.0);
+    }
     let hit_position = position + direction * (ray.t_start + found.tau * ray.t_length);
     var at_hit = point;
     at_hit.uv = hit.xy;
@@ -36,7 +46,7 @@ fn shade_relief(position: vec3f, point: SurfacePoint) -> ReliefTargets {
     let depth = dot(relative, frame.forward.xyz);
     var out: ReliefTargets;
     out.color = displayable(light.color);
-    out.trace = pack_trace(TRACE_COVERED | TRACE_MARCHED, found.status, light.shadow_rays, found.steps);
+    out.trace = pack_trace(TRACE_COVERED | need.trace | light.trace, found.status, light.shadow_rays, found.steps);
     out.place = vec4f(hit.xy + ray.tile, depth, hit.z);
     out.position = vec4f(relative, light.blocked);
     out.normal = vec4f(normal, ray.cos_theta);

@@ -28,7 +28,7 @@ fn shade_mesh(position: vec3f, normal: vec3f, uv: vec2f, albedo: vec4f, point: S
     let light = lit(albedo.rgb, relative, world_normal(normal), point);
     var shaded: Shaded;
     shaded.color = displayable(light.color);
-    shaded.trace = pack_trace(TRACE_COVERED, 0u, light.shadow_rays, 0u);
+    shaded.trace = pack_trace(TRACE_COVERED | light.trace, 0u, light.shadow_rays, 0u);
     shaded.place = vec4f(uv, dot(relative, frame.forward.xyz), material.base);
     shaded.position = vec4f(relative, light.blocked);
     shaded.normal = vec4f(world_normal(normal), 0.0);

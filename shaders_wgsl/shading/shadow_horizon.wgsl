@@ -4,6 +4,7 @@
 // The map was baked for the plane: on a curved mesh each point takes its tangent plane for it. What hides
 // a light that stands within the relief is not told from what stands behind it.
 #import "bindings/horizon.wgsl"
+#import "lib/hidden.wgsl"
 #import "lib/horizon.wgsl"
 #import "lib/surface_frame.wgsl"
 #import "lib/surface_point.wgsl"
@@ -42,14 +43,15 @@ fn horizon_sine(uv: vec2f, direction: vec2f) -> f32 {
 }
 
 // The share of the light that the relief hides. `to_light`: object space.
-fn hidden(point: ShadowPoint, to_light: vec3f, distant: bool) -> f32 {
+fn hidden(point: ShadowPoint, to_light: vec3f, distant: bool) -> Hidden {
     // Texture space is the same on every mesh; the map's own mesh space is the one it was baked for.
     let coordinates = frame_coordinates(point.surface, to_light);
     let across = coordinates.xy * horizon_info.tile_size * vec2f(1.0, -1.0);
     let length_squared = dot(across, across) + coordinates.z * coordinates.z;
     if !(coordinates.z > 0.0) || !(length_squared > 0.0) {
-        return 1.0;
+        return Hidden(1.0, SHADOW_RAYS);
     }
     let light_sine = coordinates.z / sqrt(length_squared);
-    return horizon_hides(light_sine, horizon_sine(point.place.xy, across), horizon_info.softness);
+    let share = horizon_hides(light_sine, horizon_sine(point.place.xy, across), horizon_info.softness);
+    return Hidden(share, SHADOW_RAYS);
 }

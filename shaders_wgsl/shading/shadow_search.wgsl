@@ -1,5 +1,9 @@
 // Self-shadow: the technique's own search from the hit towards the light.
+#import "bindings/draw.wgsl"
 #import "bindings/material.wgsl"
+#import "lib/bounds.wgsl"
+#import "lib/found.wgsl"
+#import "lib/hidden.wgsl"
 #import "lib/texture_ray.wgsl"
 
 const SHADOW_RAYS: u32 = 1u;
@@ -18,13 +22,38 @@ fn tests_shadows() -> bool {
 }
 
 // The share of the light that the relief hides: all or nothing. `to_light`: object space, see shadow_ray.
-fn hidden(point: ShadowPoint, to_light: vec3f, distant: bool) -> f32 {
+fn hidden(point: ShadowPoint, to_light: vec3f, distant: bool) -> Hidden {
     let ray = shadow_ray(point.surface, to_light, distant, point.place.z, material.scale);
     if !ray.above {
-        return 1.0;
+        return Hidden(1.0, select(SHADOW_RAYS, 0u, skip_shadow));
     }
     if !(ray.delta.z > 0.0) {
-        return 0.0;
+        return Hidden(0.0, select(SHADOW_RAYS, 0u, skip_shadow));
     }
-    return select(0.0, 1.0, occluded(point.place, ray.delta, ray.cos_theta));
+    var stretch = WHOLE_STRETCH;
+    if skip_shadow && cast_shadows {
+        let until = clears(point.place, ray.delta);
+        if until <= 0.0 {
+            return Hidden(0.0, 0u);
+        }
+        stretch.y = until;
+    }
+    return Hidden(select(0.0, 1.0, occluded(point.place, ray.delta, ray.cos_theta, stretch)), SHADOW_RAYS);
+}
+
+// Where along a segment that leaves the surface nothing stands in its way any more; 0 where nothing ever does: it
+// starts above all that it passes, or rises faster than any of it.
+fn clears(start: vec3f, delta: vec3f) -> f32 {
+    let top = start.z + delta.z;
+    let over = ground_ray(start, delta);
+    var high = clamp(draw.span.y, start.z, top);
+    high = clamp(ground_heights(ground_node(over, start.z, high)).y, start.z, high);
+    let node = ground_node(over, start.z, high);
+    high = clamp(ground_heights(node).y, start.z, high);
+    var rise = dot(ground_slopes(node), abs(delta.xy) * vec2f(material.map_width, material.map_height));
+    if slack(1.0) > 0.0 {
+        // Searches with layers lift what starts below the surface, and the rest of the segment rises by so much less.
+        rise += max(height_at(start.xy) - start.z, 0.0);
+    }
+    return select((high - start.z) / delta.z, 0.0, delta.z > rise);
 }

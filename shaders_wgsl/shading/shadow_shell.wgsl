@@ -3,6 +3,7 @@
 #import "bindings/draw.wgsl"
 #import "bindings/material.wgsl"
 #import "bindings/solid_heights.wgsl"
+#import "lib/hidden.wgsl"
 #import "lib/normalize.wgsl"
 #import "lib/surface_frame.wgsl"
 #import "shading/shell.wgsl"
@@ -43,7 +44,7 @@ fn blocks(at: u32, point: ShadowPoint, relative: vec3f, to_light: vec3f, last: f
 }
 
 // The share of the light that is hidden: all or nothing. `to_light`: object space, its full distance.
-fn hidden(point: ShadowPoint, to_light: vec3f, distant: bool) -> f32 {
+fn hidden(point: ShadowPoint, to_light: vec3f, distant: bool) -> Hidden {
     let relative = (draw.relative_from_object * vec4f(point.position, 1.0)).xyz;
     let direction = (draw.relative_from_object * vec4f(to_light, 0.0)).xyz;
     let last = select(1.0, 1e30, distant);
@@ -68,7 +69,7 @@ fn hidden(point: ShadowPoint, to_light: vec3f, distant: bool) -> f32 {
             }
         }
     }
-    return select(0.0, 1.0, found);
+    return Hidden(select(0.0, 1.0, found), SHADOW_RAYS);
 }
 
 // The point of the displaced surface over a place of the mesh. weights: of the second and third corner.

@@ -46,7 +46,9 @@ mod _bumpwgpu {
     #[pymodule_export]
     use crate::mesh::{PyMesh, tangent_methods, tangents};
     #[pymodule_export]
-    use crate::rendering::{PyMaterial, PyRenderer, PyTicket, adapters, aov_names, march_gpu, skip_names};
+    use crate::rendering::{
+        PyMaterial, PyRenderer, PyTicket, adapters, aov_names, march_gpu, skip_codes, skip_names,
+    };
     #[pymodule_export]
     use crate::repair::{check_normals, dequantise, derivatives, integrate_normals, quantum, seams};
     #[pymodule_export]

@@ -11,7 +11,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use render::{
-    AovSet, Camera, Draw, HorizonShadows, Light, RenderError, Renderer, Request, Scene, Skips,
+    AovSet, Camera, Draw, HorizonShadows, Light, RenderError, Renderer, Request, Scene, SkipError, Skips,
     TechniqueChoice, Ticket,
 };
 
@@ -132,6 +132,7 @@ impl PyRenderer {
         specular_aa: bool,
         aovs: Vec<String>,
         skips: Vec<String>,
+        skip_error: (f32, f32),
     ) -> PyResult<Self> {
         let technique = parse_choice(technique, &parameters)?;
         let aovs = aovs.iter().try_fold(AovSet::NONE, |set, name| {
@@ -154,7 +155,10 @@ impl PyRenderer {
         };
         let horizon = horizon.map(|(azimuths, softness)| HorizonShadows { azimuths, softness });
         let plain = Request::new(technique, size[0], size[1]);
-        let request = Request { shadows, horizon, silhouettes, samples, specular_aa, aovs, skips, ..plain };
+        let (texels, pixels) = skip_error;
+        let skip_error = SkipError { texels, pixels };
+        let request =
+            Request { shadows, horizon, silhouettes, samples, specular_aa, aovs, skips, skip_error, ..plain };
         let made = run(py, None, |_| Renderer::new(render::device()?, scene, request))?;
         let reads = match &technique {
             TechniqueChoice::Search(technique) => Some(technique.info.reads),
@@ -262,6 +266,7 @@ fn frame_to_dict(py: Python<'_>, frame: render::Frame) -> PyResult<Bound<'_, PyD
     plane("mask", from.mask.map(|mask| mask.into_iter().map(f32::from).collect()), 1)?;
     plane("ray_start", from.ray_start, 3)?;
     plane("ray_delta", from.ray_delta, 3)?;
+    plane("skip", from.skip.map(|codes| codes.into_iter().map(|code| code as f32).collect()), 1)?;
     let s = frame.stats;
     let stats = PyDict::new(py);
     stats.set_item("prepare_ms", s.prepare_ms)?;
@@ -298,6 +303,13 @@ fn frame_to_dict(py: Python<'_>, frame: render::Frame) -> PyResult<Bound<'_, PyD
 #[pyfunction]
 pub fn aov_names() -> Vec<&'static str> {
     AovSet::NAMED.map(|(name, _)| name).to_vec()
+}
+
+/// What stands for each kind in the output "skip".
+#[pyfunction]
+pub fn skip_codes() -> Vec<(&'static str, u32)> {
+    let kinds = Skips::NAMED.into_iter().filter(|(_, kind)| Skips::IN_PIXELS.contains(*kind));
+    kinds.map(|(name, kind)| (name, kind.bits())).chain([("normal", Skips::ON_MESH)]).collect()
 }
 
 /// Names of the kinds of work that a rendering may leave out.

@@ -6,6 +6,14 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum RenderError {
+    /// An error that skipping may make which is none.
+    #[error("skip_error is ({texels} texels, {pixels} pixels); both must be finite and not negative")]
+    SkipError {
+        /// In texels.
+        texels: f32,
+        /// In pixels.
+        pixels: f32,
+    },
     /// No Vulkan device answers.
     #[error(
         "no Vulkan device answers. On Debian and Ubuntu `apt-get install mesa-vulkan-drivers libvulkan1` gives a \

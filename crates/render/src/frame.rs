@@ -26,6 +26,9 @@ pub struct Aovs {
     pub ray_start: Option<Vec<f32>>,
     /// End minus start of that segment; H * W * 3.
     pub ray_delta: Option<Vec<f32>>,
+    /// What was left out of a pixel's work: [`Skips::bits`](crate::Skips::bits) of the kinds, 512 besides "parallax"
+    /// where what is seen stays on the mesh, and from bit 16 on the number of shadow rays left out; H * W.
+    pub skip: Option<Vec<u32>>,
 }
 
 /// What it took. Times are milliseconds; of several samples a pixel all are counted.

@@ -7,9 +7,10 @@ use bytemuck::Zeroable;
 use heightfield::technique::Reads;
 use heightfield::{BakedMap, ConeMap, HeightField};
 
+use crate::bounds::Bounds;
 use crate::texture::{MipLevel, sampler, upload};
 use crate::uniforms::{DistanceInfo, HeightInfo, wrap_code};
-use crate::uploads::{Kind, Resource};
+use crate::uploads::{Ground, Kind, Resource};
 use crate::{Device, RenderError, tally};
 
 /// What the shaders need to know about a field. The pyramid's part is filled in when `with_pyramid`.
@@ -23,6 +24,7 @@ pub fn height_info(field: &HeightField, with_pyramid: bool) -> HeightInfo {
         wrap: wrap_code(field.wrap()),
         cells: field.cells().map(|side| side as u32),
         first_texel: field.first_texel() as i32,
+        bounds_depth: Bounds::depth_of(field),
         ..HeightInfo::zeroed()
     };
     if with_pyramid {
@@ -46,9 +48,32 @@ impl Device {
         let (resource, _) = self.keep(field, Kind::Field(reads), make)?;
         match resource {
             Resource::Group(group) => Ok(group),
-            Resource::View(_) => Err(RenderError::Device {
+            _ => Err(RenderError::Device {
                 during: "looking up a height field",
-                message: "a texture was kept in its place".to_owned(),
+                message: "something else was kept in its place".to_owned(),
+            }),
+        }
+    }
+
+    /// What rays can meet over a field, uploaded once a field; `None`: one node that says nothing.
+    pub(crate) fn ground(&self, field: Option<&Arc<HeightField>>) -> Result<Ground, RenderError> {
+        let upload = |nodes: &[u32]| {
+            self.buffer_with("bounds", bytemuck::cast_slice(nodes), wgpu::BufferUsages::STORAGE)
+        };
+        let Some(field) = field else {
+            let nodes = upload(&Bounds::UNKNOWN)?;
+            return Ok(Ground { nodes, span: [0.0, 1.0] });
+        };
+        let make = || {
+            let bounds = Bounds::of(field);
+            let nodes = upload(bounds.nodes())?;
+            Ok(Resource::Ground(Ground { nodes, span: bounds.span() }))
+        };
+        match self.keep(field, Kind::Bounds, make)?.0 {
+            Resource::Ground(ground) => Ok(ground),
+            _ => Err(RenderError::Device {
+                during: "looking up bounds",
+                message: "something else was kept in their place".to_owned(),
             }),
         }
     }

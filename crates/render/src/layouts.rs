@@ -27,6 +27,7 @@ pub struct Layouts {
     /// Group 1: corners, and a buffer that goes with their cells: cone ratios or distances.
     pub cells: BindGroupLayout,
     draw: BindGroupLayout,
+    draw_with_bounds: BindGroupLayout,
     draw_with_solids: BindGroupLayout,
     /// Group 0 of the march kernel.
     pub march: BindGroupLayout,
@@ -97,6 +98,10 @@ impl Layouts {
                 &[entry(0, seen, storage(true)), entry(1, seen, storage(true)), entry(2, seen, uniform())],
             ),
             draw: make("draw", &draw[..1]),
+            draw_with_bounds: make(
+                "draw with the bounds of its ground",
+                &[draw[0], entry(BOUNDS, ShaderStages::FRAGMENT, storage(true))],
+            ),
             draw_with_solids: make("draw among solids", &draw),
             march: make(
                 "march",
@@ -115,9 +120,13 @@ impl Layouts {
         }
     }
 
-    /// The layout of group 3; `solids`: with all meshes of the scene and the shells around them.
-    pub fn draw(&self, solids: bool) -> &BindGroupLayout {
-        if solids { &self.draw_with_solids } else { &self.draw }
+    /// The layout of group 3.
+    pub fn draw(&self, beside: BesideDraw) -> &BindGroupLayout {
+        match beside {
+            BesideDraw::Nothing => &self.draw,
+            BesideDraw::Bounds => &self.draw_with_bounds,
+            BesideDraw::Solids => &self.draw_with_solids,
+        }
     }
 
     /// The layout of group 2; `horizon`: with a horizon map at bindings 7 to 9.
@@ -128,6 +137,31 @@ impl Layouts {
             MaterialMaps::Map => 1,
             MaterialMaps::MapAndCube => 2,
         }]
+    }
+}
+
+/// Binding of the bounds in group 3.
+pub const BOUNDS: u32 = 10;
+
+/// What an entry binds in group 3 besides the draw itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BesideDraw {
+    /// Nothing.
+    Nothing,
+    /// What rays can meet, at [`BOUNDS`].
+    Bounds,
+    /// All meshes of the scene and the shells around them, at 1 to 9.
+    Solids,
+}
+
+impl BesideDraw {
+    /// Of an entry.
+    pub fn of(entry: &str) -> Self {
+        match entry {
+            "relief" | "relief_mapped" => Self::Bounds,
+            entry if shaders::traces_solids(entry) => Self::Solids,
+            _ => Self::Nothing,
+        }
     }
 }
 

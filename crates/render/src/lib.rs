@@ -9,6 +9,7 @@
 //! Positions reach the device relative to the camera, computed in `f64`.
 
 pub mod adapter;
+pub mod bounds;
 pub mod camera;
 mod clusters;
 mod culling;
@@ -34,6 +35,7 @@ mod resolve;
 pub mod scene;
 mod shell;
 pub mod skips;
+mod sparing;
 pub mod surface;
 mod tally;
 mod targets;
@@ -59,4 +61,4 @@ pub use render::{render, render_in_bands};
 pub use renderer::{Renderer, Ticket};
 pub use request::{AovSet, HorizonShadows, Request, TechniqueChoice};
 pub use scene::{Draw, Light, Material, Scene};
-pub use skips::{Skipped, Skips};
+pub use skips::{SkipError, Skipped, Skips};

@@ -1,5 +1,6 @@
 //! Rays in texture space on the device: the parity tests, the benches and `march(device="gpu")`.
 
+use bytemuck::Zeroable;
 use heightfield::march::{period, texture_space_normal, validate};
 use heightfield::technique::Reads;
 use heightfield::{HeightField, Hits, RayArray, Segment, Status, Technique};
@@ -187,12 +188,17 @@ fn dispatch(
                 start: segment.start.to_array(),
                 cos_theta: segment.cos_theta,
                 delta: segment.delta.to_array(),
-                unused: 0.0,
+                stretch: [0.0, 1.0],
+                ..MarchSegment::zeroed()
             },
             // A ray that stays above the lid: straight down, and its answer is not looked at.
-            None => {
-                MarchSegment { start: [0.0, 0.0, 1.0], cos_theta: 1.0, delta: [0.0, 0.0, -1.0], unused: 0.0 }
-            }
+            None => MarchSegment {
+                start: [0.0, 0.0, 1.0],
+                cos_theta: 1.0,
+                delta: [0.0, 0.0, -1.0],
+                stretch: [0.0, 1.0],
+                ..MarchSegment::zeroed()
+            },
         })
         .collect();
     let storage = wgpu::BufferUsages::STORAGE;
@@ -231,6 +237,9 @@ fn dispatch(
             timer.resolve(&mut encoder);
         }
         device.queue.submit([encoder.finish()]);
+        if let Some(timer) = &timer {
+            timer.map();
+        }
         device.wait("marching")?;
         let seconds = match &timer {
             Some(timer) => timer.read_ms(device)? * 1e-3,

@@ -180,9 +180,9 @@ fn surface_map(
 fn view((resource, made): (Resource, bool)) -> Result<(wgpu::TextureView, bool), RenderError> {
     match resource {
         Resource::View(view) => Ok((view, made)),
-        Resource::Group(_) => Err(RenderError::Device {
+        _ => Err(RenderError::Device {
             during: "looking up a map",
-            message: "a bind group was kept in its place".to_owned(),
+            message: "something else was kept in its place".to_owned(),
         }),
     }
 }

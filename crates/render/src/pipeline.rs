@@ -6,6 +6,7 @@ use heightfield::technique::Reads;
 use heightfield::{HeightField, Technique};
 
 use crate::device::lock;
+use crate::layouts::BesideDraw;
 use crate::request::Program;
 use crate::targets::{DEPTH_FORMAT, TARGET_FORMATS, TargetSet};
 use crate::{Device, RenderError, TechniqueChoice, tally};
@@ -157,7 +158,7 @@ impl Device {
                 Some(&self.layouts.frame),
                 self.field_layout(key.reads),
                 Some(self.layouts.material(key.program.maps, key.program.horizon)),
-                Some(self.layouts.draw(shaders::traces_solids(key.program.entry))),
+                Some(self.layouts.draw(BesideDraw::of(key.program.entry))),
             ],
             immediate_size: 0,
         });

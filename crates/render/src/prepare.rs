@@ -4,7 +4,6 @@
 use std::collections::HashMap;
 use std::num::NonZeroU64;
 use std::sync::Arc;
-use std::time::Instant;
 
 use glam::DVec3;
 use heightfield::technique::Reads;
@@ -13,17 +12,22 @@ use mesh::Mesh;
 use crate::clusters::{Cluster, Clusters};
 use crate::geometry::{Attributes, CUBOID, Geometry};
 use crate::heights::bind;
+use crate::layouts::{BOUNDS, BesideDraw};
 use crate::materials::{MaterialKey, material_group};
-use crate::pipeline::{Pipeline, PipelineKey, attributes, constants_of, reads_of};
+use crate::pipeline::{PipelineKey, attributes, constants_of, reads_of};
 use crate::request::Program;
 use crate::shell::SceneSolids;
+use crate::sparing::Sparing;
 use crate::targets::TargetSet;
 use crate::uniforms::DrawInfo;
 use crate::{Device, Draw, RenderError, Request, Stats, TechniqueChoice};
 
 /// What is drawn of a draw the same way in all views.
 pub(crate) struct Fixed {
-    pub pipeline: Arc<Pipeline>,
+    /// Compiled when a view first needs it.
+    pub key: PipelineKey,
+    /// What takes its place in views that need no march.
+    pub spared: Option<PipelineKey>,
     pub geometry: Geometry,
     /// Groups that may be left out; none where all is drawn or nothing.
     pub groups: Option<Arc<[Cluster]>>,
@@ -43,6 +47,7 @@ pub(crate) struct Prepared {
     pub place: wgpu::BindGroup,
     pub fixed: Option<Fixed>,
     pub cutting: Option<Cutting>,
+    pub sparing: Sparing,
 }
 
 /// A run of a mesh's triangles on the device.
@@ -62,6 +67,8 @@ pub(crate) struct Shared {
     runs: HashMap<(usize, u32, u32), Run>,
     /// Boxes around solids, by the solids' numbers.
     boxes: HashMap<u32, Geometry>,
+    /// Places with the bounds of a map beside them.
+    grounds: HashMap<usize, wgpu::BindGroup>,
     materials: HashMap<MaterialKey, wgpu::BindGroup>,
     place: wgpu::BindGroup,
     /// Whether light rays are traced.
@@ -94,7 +101,7 @@ impl Shared {
         let stride = (size_of::<DrawInfo>() as u64).next_multiple_of(alignment);
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
         let places = device.buffer("places", stride * draws.max(1) as u64, usage)?;
-        let place = place_group(device, &places, Vec::new())?;
+        let place = place_group(device, &places, BesideDraw::Nothing, Vec::new())?;
         Ok(Self {
             places,
             stride,
@@ -103,6 +110,7 @@ impl Shared {
             meshes: HashMap::new(),
             runs: HashMap::new(),
             boxes: HashMap::new(),
+            grounds: HashMap::new(),
             materials: HashMap::new(),
         })
     }
@@ -125,7 +133,10 @@ impl Shared {
             && request.technique.takes_horizon();
         let reads = reads_of(&request.technique).filter(|_| solids.is_none());
         let shadows = self.shadows;
-        let key = |program| key(draw, request, program, reads, shadows);
+        let sparing = Sparing::of(device, draw, request)?;
+        let key = |program: Program, marches| {
+            key(draw, request, program, reads, shadows, sparing.constants(program, request, marches))
+        };
 
         let field = reads.map(|reads| device.field_group(&draw.material.field, reads)).transpose()?;
         let material = entry(&mut self.materials, MaterialKey::new(&draw.material, program), || {
@@ -134,16 +145,21 @@ impl Shared {
         if let Some((solids, own)) = solids {
             let place = solids.group();
             if request.technique.draws_geometry() {
-                let cutting = Some(Cutting { key: key(program) });
-                return Ok(Prepared { field, material, place, fixed: None, cutting });
+                let cutting = Some(Cutting { key: key(program, true) });
+                return Ok(Prepared { field, material, place, fixed: None, cutting, sparing });
             }
             let geometry = entry(&mut self.boxes, own, || {
                 let [low, high] = solids.bounds(own);
                 Geometry::cuboid(device, low, high)
             })?;
-            let pipeline = compiled(device, key(Program { entry: "shell", ..program }), stats)?;
-            let fixed = Some(Fixed { pipeline, geometry, triangles: CUBOID.len() as u32, groups: None });
-            return Ok(Prepared { field, material, place, fixed, cutting: None });
+            let fixed = Some(Fixed {
+                key: key(Program { entry: "shell", ..program }, true),
+                spared: None,
+                geometry,
+                triangles: CUBOID.len() as u32,
+                groups: None,
+            });
+            return Ok(Prepared { field, material, place, fixed, cutting: None, sparing });
         }
         let locations = attributes(program.entry);
         let geometry = entry(&mut self.meshes, (address(&draw.mesh), locations), || {
@@ -151,13 +167,22 @@ impl Shared {
         })?;
         let Run { indices, groups } = self.run(device, draw, middle)?;
         let fixed = Fixed {
-            pipeline: compiled(device, key(program), stats)?,
+            key: key(program, true),
+            spared: program.search.map(|_| key(program, false)),
             geometry: Geometry { attributes: geometry, indices },
             triangles: draw.triangles.end - draw.triangles.start,
             groups: Some(groups),
         };
-        let place = self.place.clone();
-        Ok(Prepared { field, material, place, fixed: Some(fixed), cutting: None })
+        let place = if BesideDraw::of(program.entry) == BesideDraw::Bounds {
+            let map = Arc::as_ptr(&draw.material.field) as usize;
+            let (places, nodes) = (&self.places, sparing.ground.nodes.as_entire_binding());
+            entry(&mut self.grounds, map, || {
+                place_group(device, places, BesideDraw::Bounds, vec![bind(BOUNDS, nodes)])
+            })?
+        } else {
+            self.place.clone()
+        };
+        Ok(Prepared { field, material, place, fixed: Some(fixed), cutting: None, sparing })
     }
 
     fn run(&mut self, device: &Device, draw: &Draw<'_>, middle: DVec3) -> Result<Run, RenderError> {
@@ -171,24 +196,13 @@ impl Shared {
     }
 }
 
-/// The pipeline of that key, and the time that it takes to compile it where it is new.
-pub(crate) fn compiled(
-    device: &Device,
-    key: PipelineKey,
-    stats: &mut Stats,
-) -> Result<Arc<Pipeline>, RenderError> {
-    let before = Instant::now();
-    let pipeline = device.pipeline(key);
-    stats.compile_ms += before.elapsed().as_secs_f64() * 1e3;
-    pipeline
-}
-
 fn key(
     draw: &Draw<'_>,
     request: &Request,
     program: Program,
     reads: Option<Reads>,
     shadows: bool,
+    sparing: Vec<(&'static str, i64)>,
 ) -> PipelineKey {
     let mut constants = Vec::new();
     if let (TechniqueChoice::Search(technique), Some(_)) = (&request.technique, reads) {
@@ -200,6 +214,7 @@ fn key(
     if program.search.is_some() && !program.horizon {
         constants.push(("cast_shadows", i64::from(shadows)));
     }
+    constants.extend(sparing);
     if program.entry == "shell" {
         constants.push(("sees_inside", i64::from(draw.material.double_sided)));
     }
@@ -213,24 +228,24 @@ fn key(
     }
 }
 
-/// Group 3, with entries of all solids of the scene where there are any.
+/// Group 3, with what stands beside the place.
 pub(crate) fn place_group(
     device: &Device,
     places: &wgpu::Buffer,
-    solids: Vec<wgpu::BindGroupEntry<'_>>,
+    beside: BesideDraw,
+    others: Vec<wgpu::BindGroupEntry<'_>>,
 ) -> Result<wgpu::BindGroup, RenderError> {
     let place = wgpu::BufferBinding {
         buffer: places,
         offset: 0,
         size: NonZeroU64::new(size_of::<DrawInfo>() as u64),
     };
-    let layout = device.layouts.draw(!solids.is_empty());
     let mut entries = vec![bind(0, wgpu::BindingResource::Buffer(place))];
-    entries.extend(solids);
+    entries.extend(others);
     device.guard("binding a draw", || {
         Ok(device.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("draw"),
-            layout,
+            layout: device.layouts.draw(beside),
             entries: &entries,
         }))
     })

@@ -27,8 +27,11 @@ impl Readback {
         u64::from(row_bytes(self.width, at).1) * u64::from(rows)
     }
 
-    /// Asks for `rows` rows to be mapped when the device is done with them.
+    /// Asks for `rows` rows, and for the time, when the device is done with them.
     pub fn map(&self, rows: u32) {
+        if let Some(timer) = &self.timer {
+            timer.map();
+        }
         for (at, buffer) in self.buffers.iter().enumerate() {
             if let Some(buffer) = buffer {
                 buffer.slice(..self.bytes(at, rows)).map_async(wgpu::MapMode::Read, |_| ());

@@ -4,7 +4,7 @@ use heightfield::Technique;
 
 use crate::layouts::MaterialMaps;
 use crate::plain::{PLAIN_TECHNIQUES, PlainTechnique};
-use crate::{RenderError, Skips};
+use crate::{RenderError, SkipError, Skips};
 
 /// How the relief is shown.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -133,11 +133,13 @@ impl AovSet {
     pub const RAY_START: Self = Self(1 << 8);
     /// End minus start of that segment.
     pub const RAY_DELTA: Self = Self(1 << 9);
+    /// What was left out of a pixel's work.
+    pub const SKIP: Self = Self(1 << 10);
     /// All.
-    pub const ALL: Self = Self((1 << 10) - 1);
+    pub const ALL: Self = Self((1 << 11) - 1);
 
     /// Names with their sets.
-    pub const NAMED: [(&'static str, Self); 10] = [
+    pub const NAMED: [(&'static str, Self); 11] = [
         ("uv", Self::UV),
         ("depth", Self::DEPTH),
         ("position", Self::POSITION),
@@ -148,6 +150,7 @@ impl AovSet {
         ("mask", Self::MASK),
         ("ray_start", Self::RAY_START),
         ("ray_delta", Self::RAY_DELTA),
+        ("skip", Self::SKIP),
     ];
 
     /// The set of one output by name.
@@ -220,6 +223,8 @@ pub struct Request {
     pub aovs: AovSet,
     /// What may be left out where the picture does not need it.
     pub skips: Skips,
+    /// How far what is seen may be off for it.
+    pub skip_error: SkipError,
 }
 
 impl Request {
@@ -271,6 +276,7 @@ impl Request {
             specular_aa: true,
             aovs: AovSet::NONE,
             skips: Skips::ALL,
+            skip_error: SkipError::default(),
         }
     }
 }

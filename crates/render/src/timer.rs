@@ -55,11 +55,14 @@ impl Timer {
         encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.readback, 0, 16);
     }
 
-    /// Milliseconds between the two timestamps, once the device is done.
+    /// Asks for the timestamps once what resolves them is submitted.
+    pub fn map(&self) {
+        self.readback.slice(..).map_async(wgpu::MapMode::Read, |_| ());
+    }
+
+    /// Milliseconds between the two timestamps, which have been asked for, once the device is done.
     pub fn read_ms(&self, device: &Device) -> Result<f64, RenderError> {
         let fail = |message: String| RenderError::Device { during: "reading a timer", message };
-        self.readback.slice(..).map_async(wgpu::MapMode::Read, |_| ());
-        device.wait("reading a timer")?;
         let mapped = self.readback.slice(..).get_mapped_range().map_err(|error| fail(error.to_string()))?;
         let word = |at: usize| u64::from_le_bytes(std::array::from_fn(|i| mapped[at + i]));
         let ticks = word(8).saturating_sub(word(0));

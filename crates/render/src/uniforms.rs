@@ -49,19 +49,26 @@ pub struct DrawInfo {
     pub object_from_relative: Mat4,
     /// Camera in the space of the centred mesh.
     pub eye: Vec4,
+    /// Times the way from the camera: the heights that a hit may be off.
+    pub most_heights: [f32; 3],
+    /// Texels that it may be off in place of that.
+    pub most_texels: f32,
+    /// The lowest and the highest point of the map.
+    pub span: [f32; 2],
     /// Its number among the instances, and that of its solid.
-    pub own: [u32; 4],
+    pub own: [u32; 2],
 }
 
 impl DrawInfo {
     /// Of a mesh that stands there; `own` as in [`DrawInfo::own`].
-    pub(crate) fn of(relative_from_object: DMat4, [instance, solid]: [u32; 2]) -> Self {
+    pub(crate) fn of(relative_from_object: DMat4, own: [u32; 2]) -> Self {
         let object_from_relative = relative_from_object.inverse();
         Self {
             relative_from_object: relative_from_object.as_mat4(),
             object_from_relative: object_from_relative.as_mat4(),
             eye: object_from_relative.w_axis.as_vec4(),
-            own: [instance, solid, 0, 0],
+            own,
+            ..Self::zeroed()
         }
     }
 }
@@ -249,8 +256,8 @@ pub struct HeightInfo {
     pub highest: f32,
     /// A depth of `n` nodes starts at `offset_bits & (n - 1)`.
     pub offset_bits: u32,
-    /// Padding.
-    pub unused: u32,
+    /// Finest depth of the quadtree of [`Bounds`](crate::bounds::Bounds).
+    pub bounds_depth: u32,
 }
 
 /// Twin of `MarchSegment` in `shaders_wgsl/kernels/march.wgsl`.
@@ -265,6 +272,10 @@ pub struct MarchSegment {
     pub delta: [f32; 3],
     /// Padding.
     pub unused: f32,
+    /// The part of it that can meet the surface.
+    pub stretch: [f32; 2],
+    /// Padding.
+    pub unused_too: [f32; 2],
 }
 
 /// Twin of `MarchResult` in `shaders_wgsl/kernels/march.wgsl`.

@@ -3,13 +3,15 @@
 use glam::{DVec3, Vec3};
 
 use crate::targets::{COLOR, NORMAL, PLACE, POSITION, RAY_DELTA, RAY_START, TRACE};
-use crate::{AovSet, Aovs, Frame, RenderError, Request, Stats};
+use crate::{AovSet, Aovs, Frame, RenderError, Request, Skips, Stats};
 
 /// Collects rows. The twin of `pack_trace` in `shaders_wgsl/lib/targets.wgsl`.
 pub(crate) struct Unpacker {
     width: usize,
     height: usize,
     eye: DVec3,
+    /// Lights, as far as the trace counts.
+    lights: u32,
     color: Vec<u8>,
     trace: Vec<u32>,
     aovs: Aovs,
@@ -18,6 +20,10 @@ pub(crate) struct Unpacker {
 
 const COVERED: u32 = 1 << 31;
 const MARCHED: u32 = 1 << 30;
+const RANGE: u32 = 1 << 19;
+const SHADOWED: u32 = 1 << 18;
+/// Most shadow rays that the trace counts.
+const MOST_RAYS: usize = 255;
 
 fn status(trace: u32) -> u32 {
     (trace >> 28) & 3
@@ -28,11 +34,11 @@ fn shadow_rays(trace: u32) -> u32 {
 }
 
 fn steps(trace: u32) -> u32 {
-    trace & 0xf_ffff
+    trace & 0x3_ffff
 }
 
 impl Unpacker {
-    pub fn new(request: &Request, eye: DVec3) -> Result<Self, RenderError> {
+    pub fn new(request: &Request, eye: DVec3, lights: usize) -> Result<Self, RenderError> {
         let (width, height) = (request.width as usize, request.height as usize);
         let pixels = width * height;
         let wanted = request.aovs;
@@ -53,8 +59,18 @@ impl Unpacker {
             ray_delta: floats(AovSet::RAY_DELTA, 3)?,
             steps: None,
             mask: None,
+            skip: None,
         };
-        Ok(Self { width, height, eye, color: zeros(4 * pixels)?, trace: zeros(pixels)?, aovs, wanted })
+        Ok(Self {
+            width,
+            height,
+            eye,
+            lights: lights.min(MOST_RAYS) as u32,
+            color: zeros(4 * pixels)?,
+            trace: zeros(pixels)?,
+            aovs,
+            wanted,
+        })
     }
 
     /// Takes one row of a target. The trace of a row comes before its other outputs.
@@ -98,17 +114,48 @@ impl Unpacker {
         }
     }
 
+    /// What was left out of a pixel, and how many shadow rays.
+    fn left_out(&self, trace: u32) -> (Skips, u32) {
+        let mut skips = Skips::NONE;
+        let mut note = |left_out: bool, kind| {
+            if left_out {
+                skips = skips | kind;
+            }
+        };
+        let marched = trace & MARCHED != 0;
+        note(!marched && status(trace) == 1, Skips::FLAT);
+        note(!marched && status(trace) > 1, Skips::PARALLAX);
+        note(marched && trace & RANGE != 0, Skips::RANGE);
+        let cast = trace & SHADOWED != 0;
+        let rays = if cast { self.lights.saturating_sub(shadow_rays(trace)) } else { 0 };
+        note(rays > 0, Skips::SHADOW);
+        (skips, rays)
+    }
+
     /// The frame, and the counts of its pixels.
     pub fn finish(mut self, stats: &mut Stats) -> Frame {
         for &trace in &self.trace {
             stats.pixels_covered += u64::from(trace & COVERED != 0);
             stats.pixels_marched += u64::from(trace & MARCHED != 0);
-            stats.pixels_unconverged += u64::from(status(trace) == 2);
+            stats.pixels_unconverged += u64::from(trace & MARCHED != 0 && status(trace) == 2);
+            let (skips, rays) = self.left_out(trace);
+            for kind in [Skips::FLAT, Skips::PARALLAX, Skips::RANGE] {
+                stats.skipped.add(kind, u64::from(skips.contains(kind)));
+            }
+            stats.skipped.add(Skips::SHADOW, u64::from(rays));
             stats.steps += u64::from(steps(trace));
             stats.shadow_rays += u64::from(shadow_rays(trace));
         }
         if self.wanted.contains(AovSet::MASK) {
             self.aovs.mask = Some(self.trace.iter().map(|trace| u8::from(trace & COVERED != 0)).collect());
+        }
+        if self.wanted.contains(AovSet::SKIP) {
+            let code = |&trace: &u32| {
+                let (skips, rays) = self.left_out(trace);
+                let on_mesh = trace & MARCHED == 0 && status(trace) == 3;
+                skips.bits() | u32::from(on_mesh) * Skips::ON_MESH | rays << Skips::RAYS_FROM_BIT
+            };
+            self.aovs.skip = Some(self.trace.iter().map(code).collect());
         }
         if self.wanted.contains(AovSet::STEPS) {
             self.aovs.steps = Some(self.trace.iter().map(|&trace| steps(trace)).collect());

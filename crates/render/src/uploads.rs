@@ -17,6 +17,8 @@ use crate::{Device, RenderError};
 pub(crate) enum Kind {
     /// Group 1 of searches.
     Field(Reads),
+    /// What rays can meet.
+    Bounds,
     /// Slope map.
     Slopes,
     /// 8-bit normal map baked from heights.
@@ -36,6 +38,16 @@ pub(crate) enum Kind {
 pub(crate) enum Resource {
     Group(wgpu::BindGroup),
     View(wgpu::TextureView),
+    Ground(Ground),
+}
+
+/// What rays can meet over a map.
+#[derive(Clone)]
+pub(crate) struct Ground {
+    /// The nodes of its [`Bounds`](crate::bounds::Bounds).
+    pub nodes: wgpu::Buffer,
+    /// Its lowest and its highest point.
+    pub span: [f32; 2],
 }
 
 /// Everything that is kept.

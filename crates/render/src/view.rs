@@ -2,14 +2,16 @@
 
 use std::ops::Range;
 use std::sync::Arc;
+use std::time::Instant;
 
 use glam::DVec3;
 
 use crate::culling::{Culling, Stand};
 use crate::geometry::Geometry;
 use crate::micro::{self, View};
-use crate::pipeline::Pipeline;
-use crate::prepare::{Cutting, Fixed, Prepared, compiled};
+use crate::pipeline::{Pipeline, PipelineKey};
+use crate::prepare::{Cutting, Fixed, Prepared};
+use crate::sparing::Leeway;
 use crate::{Camera, Device, Draw, RenderError, Request, Skips, Stats};
 
 /// One program over some triangles of a draw.
@@ -68,13 +70,14 @@ impl<'a> ViewOf<'a> {
         middle: DVec3,
         prepared: &Prepared,
         stand: &Stand,
+        leeway: &Leeway,
         offset: u32,
         stats: &mut Stats,
         warnings: &mut Vec<String>,
     ) -> Result<bool, RenderError> {
         let before = self.calls.len();
         let span = self.span(stand);
-        if let Some(Fixed { pipeline, geometry, groups, triangles }) = &prepared.fixed {
+        if let Some(Fixed { key, spared, geometry, groups, triangles }) = &prepared.fixed {
             let runs = match groups {
                 Some(groups) => {
                     let solid = self.request.is_solid(&draw.material);
@@ -83,7 +86,10 @@ impl<'a> ViewOf<'a> {
                 None => std::iter::once(0..*triangles).collect(),
             };
             if !runs.is_empty() {
-                let (pipeline, geometry) = (Arc::clone(pipeline), geometry.clone());
+                let spared = spared.as_ref().filter(|_| prepared.sparing.needs_no_march(leeway));
+                let key = spared.unwrap_or(key);
+                let pipeline = compiled(self.device, key, stats)?;
+                let geometry = geometry.clone();
                 self.calls.push(Call { draw: at, pipeline, geometry, runs, offset, span });
             }
         }
@@ -103,7 +109,7 @@ impl<'a> ViewOf<'a> {
                 ));
             }
             if !displaced.indices.is_empty() {
-                let pipeline = compiled(self.device, key.clone(), stats)?;
+                let pipeline = compiled(self.device, key, stats)?;
                 let geometry = Geometry::micro(self.device, &displaced)?;
                 let runs = std::iter::once(0..displaced.indices.len() as u32).collect();
                 self.calls.push(Call { draw: at, pipeline, geometry, runs, offset, span });
@@ -134,6 +140,14 @@ impl<'a> ViewOf<'a> {
         let depth = stand.relative_from_object.w_axis.truncate().dot(self.camera.forward());
         [depth - stand.radius, depth + stand.radius]
     }
+}
+
+/// The pipeline of a key; compiled now where it is new.
+fn compiled(device: &Device, key: &PipelineKey, stats: &mut Stats) -> Result<Arc<Pipeline>, RenderError> {
+    let started = Instant::now();
+    let pipeline = device.pipeline(key.clone());
+    stats.compile_ms += started.elapsed().as_secs_f64() * 1e3;
+    pipeline
 }
 
 /// How far ahead a draw is moved at most, to bound the work for scenes of many.

@@ -56,14 +56,18 @@ fn host_structs_match() {
         &displaced,
         "Instance",
     );
-    check(layout!(DrawInfo: relative_from_object, object_from_relative, eye, own), &relief, "DrawInfo");
+    check(
+        layout!(DrawInfo: relative_from_object, object_from_relative, eye, most_heights, most_texels, span, own),
+        &relief,
+        "DrawInfo",
+    );
     check(
         layout!(MaterialInfo: albedo_factor, map_width, map_height, scale, base, specular, shininess, period, wrap),
         &relief,
         "MaterialInfo",
     );
     check(
-        layout!(HeightInfo: size, base, scale, tile_size, wrap, deepest, cells, lags, first_texel, highest, offset_bits, unused),
+        layout!(HeightInfo: size, base, scale, tile_size, wrap, deepest, cells, lags, first_texel, highest, offset_bits, bounds_depth),
         &relief,
         "HeightInfo",
     );
@@ -72,7 +76,11 @@ fn host_structs_match() {
     let distance = shaders::compose("kernels/march", Some("distance"), None).unwrap();
     check(layout!(DistanceInfo: metric, unit, size, pad_0), &distance, "DistanceInfo");
     let march = shaders::compose("kernels/march", Some("exact"), None).unwrap();
-    check(layout!(MarchSegment: start, cos_theta, delta, unused), &march, "MarchSegment");
+    check(
+        layout!(MarchSegment: start, cos_theta, delta, unused, stretch, unused_too),
+        &march,
+        "MarchSegment",
+    );
     check(layout!(MarchResult: tau, status, steps, unused), &march, "MarchResult");
 }
 

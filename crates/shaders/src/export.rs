@@ -83,8 +83,8 @@ fn search_fragment(
     @location(2) cos_theta: f32,
     @location(3) light: vec3f,
 ) -> @location(0) vec4f {
-    let found = search(start, delta, cos_theta);
-    let blocked = occluded(start + found.tau * delta, light, cos_theta);
+    let found = search(start, delta, cos_theta, WHOLE_STRETCH);
+    let blocked = occluded(start + found.tau * delta, light, cos_theta, WHOLE_STRETCH);
     return vec4f(found.tau, f32(found.status), f32(found.steps), select(0.0, 1.0, blocked));
 }
 ";

@@ -12,6 +12,7 @@ use super::tree::{Bounds, tree};
 use super::{Solid, WIDER};
 use crate::device::lock;
 use crate::heights::bind;
+use crate::layouts::BesideDraw;
 use crate::prepare::place_group;
 use crate::uniforms::{InstanceInfo, ShellNode};
 use crate::{Device, RenderError, Scene, tally};
@@ -59,7 +60,7 @@ impl SceneSolids {
         let common = device.common(&solids)?;
         let buffers = common.buffers.iter().chain([&instances, &top]);
         let entries = buffers.zip(1..).map(|(buffer, binding)| bind(binding, buffer.as_entire_binding()));
-        let group = place_group(device, places, entries.collect())?;
+        let group = place_group(device, places, BesideDraw::Solids, entries.collect())?;
         let bounds = solids.iter().map(|(solid, _)| solid.bounds).collect();
         Ok(Self { instances, top, group, of_draw, bounds })
     }
