@@ -153,7 +153,7 @@ impl Unpacker {
             let code = |&trace: &u32| {
                 let (skips, rays) = self.left_out(trace);
                 let on_mesh = trace & MARCHED == 0 && status(trace) == 3;
-                skips.bits() | u32::from(on_mesh) * Skips::ON_MESH | rays << Skips::RAYS_FROM_BIT
+                skips.bits() | (u32::from(on_mesh) * Skips::ON_MESH) | (rays << Skips::RAYS_FROM_BIT)
             };
             self.aovs.skip = Some(self.trace.iter().map(code).collect());
         }
