@@ -52,7 +52,10 @@ fn through_triangle(ray: ShellRay, prism: ShellPrism, best: ShellHit) -> ShellHi
     let sum = shares.x + shares.y + shares.z;
     // Seen along the ray, its front turns clockwise.
     let from_behind = sum > 0.0;
-    if sum == 0.0 || (from_behind && !(ray.for_shadow || sees_inside)) {
+    // The light sees as much of a strip as the eye would from there. Where sheets run through each other strips fold
+    // back over them, and would else keep the light off what the eye sees through them.
+    let unlit = prism.strip != PLAIN && !from_behind;
+    if sum == 0.0 || select(from_behind && !sees_inside, unlit, ray.for_shadow) {
         return best;
     }
     let w = shares / sum;

@@ -110,14 +110,9 @@ impl Bridges {
         Self { strips }
     }
 
-    /// The nearest hit before `last`: how far, and the UV there.
-    pub fn first(
-        &self,
-        origin: DVec3,
-        direction: DVec3,
-        from_either_side: bool,
-        last: f64,
-    ) -> Option<(f64, DVec2)> {
+    /// The nearest hit before `last`: how far, and the UV there. Strips are there from in front only: for the
+    /// eye, and `to_light`, for the light at the end of the ray.
+    pub fn first(&self, origin: DVec3, direction: DVec3, to_light: bool, last: f64) -> Option<(f64, DVec2)> {
         let inverse = direction.recip();
         let mut nearest = None;
         let mut last = last;
@@ -129,7 +124,7 @@ impl Bridges {
             for ([a, b, c], uvs) in triangles {
                 let normal = (*b - *a).cross(*c - *a);
                 let narrow = normal.length() < 1e-12;
-                if narrow || (normal.dot(direction) >= 0.0 && !from_either_side) {
+                if narrow || (normal.dot(direction) < 0.0) == to_light {
                     continue;
                 }
                 let s = DMat3::from_cols(*b - *a, *c - *a, -direction).inverse() * (origin - *a);

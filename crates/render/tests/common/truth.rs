@@ -126,7 +126,7 @@ impl<'a> Truth<'a> {
         self.first(origin, direction, false)
     }
 
-    fn first(&self, origin: DVec3, direction: DVec3, from_either_side: bool) -> Option<Hit> {
+    fn first(&self, origin: DVec3, direction: DVec3, to_light: bool) -> Option<Hit> {
         let inverse = direction.recip();
         let mut nearest: Option<Hit> = None;
         let mut stack = Vec::new();
@@ -140,7 +140,7 @@ impl<'a> Truth<'a> {
                     for (child, corners) in children(corners).into_iter().enumerate() {
                         stack.push((4 * at + 1 + child, corners, depth - 1));
                     }
-                } else if let Some(hit) = self.leaf(face, corners, origin, direction, from_either_side)
+                } else if let Some(hit) = self.leaf(face, corners, origin, direction, to_light)
                     && nearest.is_none_or(|known| hit.t < known.t)
                 {
                     nearest = Some(hit);
@@ -148,7 +148,7 @@ impl<'a> Truth<'a> {
             }
         }
         let last = nearest.map_or(f64::INFINITY, |hit| hit.t);
-        if let Some((t, uv)) = self.bridges.first(origin, direction, from_either_side, last) {
+        if let Some((t, uv)) = self.bridges.first(origin, direction, to_light, last) {
             let height = self.field.height_at(uv.x, uv.y);
             nearest = Some(Hit { t, position: origin + direction * t, uv, height });
         }
