@@ -68,6 +68,7 @@ __all__ = [
     "save_map",
     "seams",
     "simd_level",
+    "skip_codes",
     "skip_names",
     "surface_points",
     "tangent_methods",
