@@ -178,7 +178,7 @@ class CompareResult:
         -------
         list of dict
             Rows by rising time, each with ``tied_with``: labels of settings whose time cannot be told from
-            its own (the quartile ranges meet, or the medians are within 40 %) and that are on the front
+            its own (the quartile ranges meet, or the medians are within 25 %) and that are on the front
             too or would be, were the tie broken in their favour; and ``certain``: whether it is on the front
             however ties are broken. On another machine one that is not certain may make way for one that it
             ties with.

@@ -16,10 +16,9 @@ pub trait DeviceMarch {
     fn march(&self, field: &HeightField, technique: &Technique, rays: &Rays) -> Result<(Hits, f64), String>;
 }
 
-/// Quotient of two medians below which times are a tie however little they scatter. One machine may put a
-/// search ahead by it and another its rival: its square, 1.96, is how far the quotient of two searches' times
-/// moves between sets of instructions, more than load, clocks, caches and where code happens to lie move it.
-pub const LEAST_LEAD: f64 = 1.4;
+/// Quotient of two medians below which times are a tie however little they scatter: load, clocks, caches and
+/// where code happens to lie move the quotient of two searches' times by that much from one machine to the next.
+pub const LEAST_LEAD: f64 = 1.25;
 
 /// One sample of a time is the least of passes, of which there are this many at least and at most. What else a
 /// machine does only ever adds.

@@ -196,19 +196,23 @@ impl<L: Lanes> CellWalk<L> {
     /// The chosen lanes of others, the own ones elsewhere.
     #[inline(always)]
     pub fn or(&self, chosen: L::M, other: &Self) -> Self {
-        let mask = |own: L::M, other: L::M| (own & !chosen) | (other & chosen);
+        let ([x, y, z], [other_x, other_y, other_z]) = (self.direction, other.direction);
         Self {
             x: self.x.or(chosen, &other.x),
             y: self.y.or(chosen, &other.y),
             t: L::select(chosen, other.t, self.t),
-            direction: [0, 1, 2].map(|k| L::select(chosen, other.direction[k], self.direction[k])),
+            direction: [
+                L::select(chosen, other_x, x),
+                L::select(chosen, other_y, y),
+                L::select(chosen, other_z, z),
+            ],
             z_start: L::select(chosen, other.z_start, self.z_start),
             pace: L::select(chosen, other.pace, self.pace),
             closed_until: L::select(chosen, other.closed_until, self.closed_until),
             steps: L::select_int(chosen, other.steps, self.steps),
-            running: mask(self.running, other.running),
-            hit: mask(self.hit, other.hit),
-            unconverged: mask(self.unconverged, other.unconverged),
+            running: either::<L>(chosen, self.running, other.running),
+            hit: either::<L>(chosen, self.hit, other.hit),
+            unconverged: either::<L>(chosen, self.unconverged, other.unconverged),
         }
     }
 
@@ -242,8 +246,9 @@ impl<L: Lanes> CellWalk<L> {
     /// Which are in the same cell as others.
     #[inline(always)]
     pub fn shares_cell(&self, other: &Self) -> L::M {
-        let same = |a: L::F, b: L::F| L::le(a, b) & L::le(b, a);
-        same(self.x.cell, other.x.cell) & same(self.y.cell, other.y.cell)
+        let (x, y) = (other.x.cell, other.y.cell);
+        let same_x = L::le(self.x.cell, x) & L::le(x, self.x.cell);
+        same_x & L::le(self.y.cell, y) & L::le(y, self.y.cell)
     }
 
     /// Takes the chosen rays ahead, to the cells that they are in then.
@@ -321,6 +326,12 @@ impl<L: Lanes> CellWalk<L> {
         self.unconverged = self.unconverged | (open & ended);
         self.running = open & !ended;
     }
+}
+
+/// The other mask where chosen.
+#[inline(always)]
+fn either<L: Lanes>(chosen: L::M, own: L::M, other: L::M) -> L::M {
+    (own & !chosen) | (other & chosen)
 }
 
 /// Follows one segment to the first point on or below the surface; see [`super::Search::trace`]. Nothing is

@@ -119,12 +119,7 @@ impl Batch {
                 let more = (L::WIDTH - running.count_ones() as usize).min(self.waiting - next);
                 used = running;
                 if more > 0 {
-                    let row = |k: usize| L::expand(vacant, &self.rows[k][next..], L::splat(0.0));
-                    let segments = Segments {
-                        start: [row(0), row(1), row(2)],
-                        delta: [row(3), row(4), row(5)],
-                        cos_theta: L::splat(1.0),
-                    };
+                    let segments = self.segments(next, vacant);
                     let mut lanes = L::bits(vacant);
                     let mut fresh = 0_u32;
                     for slot in next..next + more {
@@ -143,6 +138,26 @@ impl Batch {
                 }
             }
             rays.step(leap, maps, cells, chunk.from_surface);
+        }
+    }
+
+    /// Segments from place `next` on, one for each vacant lane.
+    #[inline(always)]
+    fn segments<L: Lanes>(&self, next: usize, vacant: L::M) -> Segments<L> {
+        let zero = L::splat(0.0);
+        let [u, v, z, du, dv, dz] = &self.rows;
+        Segments {
+            start: [
+                L::expand(vacant, &u[next..], zero),
+                L::expand(vacant, &v[next..], zero),
+                L::expand(vacant, &z[next..], zero),
+            ],
+            delta: [
+                L::expand(vacant, &du[next..], zero),
+                L::expand(vacant, &dv[next..], zero),
+                L::expand(vacant, &dz[next..], zero),
+            ],
+            cos_theta: L::splat(1.0),
         }
     }
 
