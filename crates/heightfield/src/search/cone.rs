@@ -5,17 +5,11 @@
 //! Ban, Gabor Valasek, Csaba Balint and Viktor Vad, Robust Cone Step Mapping, EGSR 2024 (a least step and
 //! cones that hold for the bilinear surface).
 
-use glam::Vec3;
-
-use super::Search;
-use super::cell_walk::trace;
 use super::cone_walk::ConeWalk;
-use crate::chunk::Chunk;
-use crate::wide::leaps;
-use crate::{ConeKind, Found, HeightField};
+use crate::ConeKind;
 
 technique! {
-    /// Parameters of [`search`](Search::trace) as described above.
+    /// Parameters of [`search`](super::Search::trace) as described above.
     Cone = "cone", reads Cone, casts_shadows true,
     summary "steps as far as an empty cone reaches, closed-form cells near the surface: misses nothing",
     source "Dummer 2006; Ban, Valasek, Balint and Vad 2024",
@@ -30,14 +24,4 @@ impl Cone {
     }
 }
 
-impl Search for Cone {
-    #[inline(always)]
-    fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, _: f32, from_surface: bool) -> Found {
-        trace(&self.walk(), field, start, delta, from_surface)
-    }
-
-    #[inline(always)]
-    fn march(&self, field: &HeightField, chunk: &mut Chunk<'_>) {
-        leaps::march(&self.walk(), self, field, chunk);
-    }
-}
+search_by_leaps!(Cone);

@@ -3,17 +3,11 @@
 //!
 //! Jonathan Dummer, Cone Step Mapping: An Iterative Ray-Heightfield Intersection Algorithm, 2006.
 
-use glam::Vec3;
-
-use super::Search;
-use super::cell_walk::trace;
 use super::cone_walk::ConeWalk;
-use crate::chunk::Chunk;
-use crate::wide::leaps;
-use crate::{ConeKind, Found, HeightField};
+use crate::ConeKind;
 
 technique! {
-    /// Parameters of [`search`](Search::trace) as described above.
+    /// Parameters of [`search`](super::Search::trace) as described above.
     ConeTexel = "cone_texel", reads ConeTexel, casts_shadows true,
     summary "the same with the published cone map, whose cones cut the surface: to show what that misses",
     source "Dummer 2006",
@@ -28,14 +22,4 @@ impl ConeTexel {
     }
 }
 
-impl Search for ConeTexel {
-    #[inline(always)]
-    fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, _: f32, from_surface: bool) -> Found {
-        trace(&self.walk(), field, start, delta, from_surface)
-    }
-
-    #[inline(always)]
-    fn march(&self, field: &HeightField, chunk: &mut Chunk<'_>) {
-        leaps::march(&self.walk(), self, field, chunk);
-    }
-}
+search_by_leaps!(ConeTexel);

@@ -6,17 +6,12 @@
 //! step is never longer than the map's bound and never shorter than the way through a cell, so nothing is
 //! missed and hits are exact.
 
-use glam::Vec3;
-
-use super::Search;
-use super::cell_walk::{CellWalk, Cells, Leap, Patch, Stand, trace};
-use crate::chunk::Chunk;
+use super::cell_walk::{CellWalk, Cells, Leap, Patch, Stand};
 use crate::lanes::Lanes;
-use crate::wide::leaps;
-use crate::{DistanceMap, Found, HeightField, Wrap};
+use crate::{DistanceMap, HeightField, Wrap};
 
 technique! {
-    /// Parameters of [`search`](Search::trace) as described above.
+    /// Parameters of [`search`](super::Search::trace) as described above.
     Distance = "distance", reads Distance, casts_shadows true,
     summary "steps as far as a ball is empty, closed-form cells near the surface: misses nothing",
     source "Donnelly 2005",
@@ -94,14 +89,12 @@ impl Leap for Distance {
     }
 }
 
-impl Search for Distance {
+impl Distance {
+    /// What it walks by.
     #[inline(always)]
-    fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, _: f32, from_surface: bool) -> Found {
-        trace(self, field, start, delta, from_surface)
-    }
-
-    #[inline(always)]
-    fn march(&self, field: &HeightField, chunk: &mut Chunk<'_>) {
-        leaps::march(self, self, field, chunk);
+    pub(crate) fn walk(&self) -> Self {
+        *self
     }
 }
+
+search_by_leaps!(Distance);

@@ -87,6 +87,31 @@ macro_rules! technique {
     };
 }
 
+/// Makes a [`Search`] of a technique whose `walk` gives a [`cell_walk::Leap`]. A blanket implementation would
+/// meet the one for [`WideSearch`](crate::wide::WideSearch).
+macro_rules! search_by_leaps {
+    ($type:ident) => {
+        impl $crate::search::Search for $type {
+            #[inline(always)]
+            fn trace(
+                &self,
+                field: &$crate::HeightField,
+                start: glam::Vec3,
+                delta: glam::Vec3,
+                _: f32,
+                from_surface: bool,
+            ) -> $crate::Found {
+                $crate::search::cell_walk::trace(&self.walk(), field, start, delta, from_surface)
+            }
+
+            #[inline(always)]
+            fn march(&self, field: &$crate::HeightField, chunk: &mut $crate::chunk::Chunk<'_>) {
+                $crate::wide::leaps::march(&self.walk(), self, field, chunk);
+            }
+        }
+    };
+}
+
 pub mod binary;
 pub mod cell_walk;
 pub mod cone;

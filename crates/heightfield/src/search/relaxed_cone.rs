@@ -6,17 +6,11 @@
 //! 2007; Robert Ban, Gabor Valasek, Csaba Balint and Viktor Vad, Robust Cone Step Mapping, EGSR 2024 (cones
 //! that are pierced once).
 
-use glam::Vec3;
-
-use super::Search;
-use super::cell_walk::trace;
 use super::cone_walk::ConeWalk;
-use crate::chunk::Chunk;
-use crate::wide::leaps;
-use crate::{ConeKind, Found, HeightField};
+use crate::ConeKind;
 
 technique! {
-    /// Parameters of [`search`](Search::trace) as described above.
+    /// Parameters of [`search`](super::Search::trace) as described above.
     RelaxedCone = "relaxed_cone", reads RelaxedCone, casts_shadows true,
     summary "steps through cones that a ray pierces at most once, then halves: misses nothing",
     source "Policarpo and Oliveira 2007; Ban, Valasek, Balint and Vad 2024",
@@ -36,14 +30,4 @@ impl RelaxedCone {
     }
 }
 
-impl Search for RelaxedCone {
-    #[inline(always)]
-    fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, _: f32, from_surface: bool) -> Found {
-        trace(&self.walk(), field, start, delta, from_surface)
-    }
-
-    #[inline(always)]
-    fn march(&self, field: &HeightField, chunk: &mut Chunk<'_>) {
-        leaps::march(&self.walk(), self, field, chunk);
-    }
-}
+search_by_leaps!(RelaxedCone);

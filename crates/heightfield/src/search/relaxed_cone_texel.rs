@@ -5,17 +5,11 @@
 //! Fabio Policarpo and Manuel Oliveira, Relaxed Cone Stepping for Relief Mapping, GPU Gems 3, chapter 18,
 //! 2007.
 
-use glam::Vec3;
-
-use super::Search;
-use super::cell_walk::trace;
 use super::cone_walk::ConeWalk;
-use crate::chunk::Chunk;
-use crate::wide::leaps;
-use crate::{ConeKind, Found, HeightField};
+use crate::ConeKind;
 
 technique! {
-    /// Parameters of [`search`](Search::trace) as described above.
+    /// Parameters of [`search`](super::Search::trace) as described above.
     RelaxedConeTexel = "relaxed_cone_texel", reads RelaxedConeTexel, casts_shadows true,
     summary "the same with the published maps, pierced more than once: to show what that misses",
     source "Policarpo and Oliveira 2007",
@@ -35,14 +29,4 @@ impl RelaxedConeTexel {
     }
 }
 
-impl Search for RelaxedConeTexel {
-    #[inline(always)]
-    fn trace(&self, field: &HeightField, start: Vec3, delta: Vec3, _: f32, from_surface: bool) -> Found {
-        trace(&self.walk(), field, start, delta, from_surface)
-    }
-
-    #[inline(always)]
-    fn march(&self, field: &HeightField, chunk: &mut Chunk<'_>) {
-        leaps::march(&self.walk(), self, field, chunk);
-    }
-}
+search_by_leaps!(RelaxedConeTexel);

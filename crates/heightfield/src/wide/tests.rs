@@ -109,7 +109,7 @@ fn every_level_jumps_as_one_lane_does() {
     let search = relaxed_cone_texel::RelaxedConeTexel { steps: 300, refine: 5 };
     leaping(&search, &search.walk());
     let search = distance::Distance { steps: 40 };
-    leaping(&search, &search);
+    leaping(&search, &search.walk());
 }
 
 #[test]
