@@ -19,6 +19,8 @@ const CREASE: f32 = 1.0;
 // So deep below the surface, in heights, a ray may come from the next triangle of a sheet without having met it there:
 // by as much chords are off. Deeper it is on the other side.
 const ROUNDED_BELOW: f32 = 2e-3;
+// Cells ahead that tell whether a ray goes down to the surface or comes out of it.
+const NEXT: f32 = 0.1;
 
 // Texture space coordinates of a point of a prism.
 fn in_texture(point: PrismPoint, uvs: mat3x2f, prism: Prism) -> vec3f {
@@ -97,9 +99,13 @@ fn through_prism(ray: ShellRay, shell_prism: ShellPrism, best: ShellHit) -> Shel
         let beside = select(0.0, CREASE / length_in_cells - done, own_sheet);
         if chord == 0.0 && beside <= 0.0 {
             let gap = gap_above(home);
-            let by_chords = from_next && !ray.for_shadow;
-            inside = gap < -select(slack, ROUNDED_BELOW, by_chords);
-            from_surface = !by_chords && abs(gap) <= slack;
+            inside = gap < -slack;
+            from_surface = abs(gap) <= slack;
+            if inside && from_next && !ray.for_shadow && gap >= -ROUNDED_BELOW {
+                // One that is coming out was below before.
+                let on = min(NEXT / length_in_cells, 1.0);
+                inside = gap_above(home + delta * on) > gap;
+            }
         }
         if beside > 0.0 {
             skipped = min(beside, 1.0);

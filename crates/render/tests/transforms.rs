@@ -78,7 +78,7 @@ fn placed_reliefs_are_displaced_objects_as_they_stand() {
             let found = agreement(&frame, &expected, &camera, texels);
             row(&format!("{name}, {}", way.0), 0.5, &found);
             assert!(found.both > if name == "needle" { 50 } else { 1000 }, "{name}: {found:?}");
-            assert!(found.outline_off == 0, "{name}: {found:?}");
+            assert!(found.outline_off.is_empty(), "{name}: {found:?}");
             assert!(found.place_p99 < 0.1 && found.depth_p99 < 5e-4, "{name} {way:?}: {found:?}");
             assert!(
                 found.texels_p99 < if name == "needle" { 2.0 } else { 0.12 },
@@ -89,7 +89,7 @@ fn placed_reliefs_are_displaced_objects_as_they_stand() {
         let larger = DMat4::from_scale(DVec3::splat(if name == "needle" { 3.0 } else { 1.02 }));
         let other = shot(&device, mesh, &material, place * larger, camera, ("exact", true));
         let Agreement { place_p99, outline_off, .. } = agreement(&other, &expected, &camera, texels);
-        assert!(place_p99 > 0.3 || outline_off > 0, "{name}");
+        assert!(place_p99 > 0.3 || !outline_off.is_empty(), "{name}");
     }
 }
 

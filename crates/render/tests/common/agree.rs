@@ -13,7 +13,7 @@ pub struct Agreement {
     pub both: usize,
     /// Pixels covered in one of them only, although all their neighbours in the truth are alike: more than a
     /// pixel off, or a hole.
-    pub outline_off: usize,
+    pub outline_off: Vec<usize>,
     /// Distance between the places, in pixels where they are, ninety-ninth percentile, away from edges in depth.
     pub place_p99: f64,
     /// Pixels covered in both whose depth lies beyond all those of the truth within a pixel around.
@@ -51,7 +51,7 @@ pub fn agreement(frame: &Frame, truth: &[Option<Hit>], camera: &Camera, texels: 
     let depth_of = |hit: &Hit| (hit.position - camera.eye).dot(camera.forward());
     let mut found = Agreement {
         both: 0,
-        outline_off: 0,
+        outline_off: Vec::new(),
         place_p99: 0.0,
         astray: Vec::new(),
         far: 0.0,
@@ -62,7 +62,7 @@ pub fn agreement(frame: &Frame, truth: &[Option<Hit>], camera: &Camera, texels: 
     for at in 0..w * h {
         let (seen, hit) = (mask[at] == 1, &truth[at]);
         if seen != hit.is_some() && around(at).all(|near| truth[near].is_some() == hit.is_some()) {
-            found.outline_off += 1;
+            found.outline_off.push(at);
         }
         let (true, Some(hit)) = (seen, hit) else { continue };
         found.both += 1;
@@ -110,7 +110,7 @@ pub fn as_truth(frame: &Frame, camera: &Camera) -> Vec<Option<Hit>> {
 /// A line of a table.
 pub fn row(name: &str, base: f32, found: &Agreement) {
     let Agreement { both, outline_off, place_p99, astray, far, texels_p99, depth_p99 } = found;
-    let astray = astray.len();
+    let (outline_off, astray) = (outline_off.len(), astray.len());
     println!(
         "| {name} | {base} | {both} | {outline_off} | {astray} | {place_p99:.3} | {:.2} % | {texels_p99:.3} | {depth_p99:.1e} |",
         100.0 * far
@@ -130,22 +130,23 @@ pub fn from(eye: [f64; 3]) -> Camera {
     Camera::look_at(DVec3::from(eye), DVec3::ZERO)
 }
 
-/// Of the pixels that are astray those that show what is nowhere within a pixel: some things are seen from one point of
-/// a pixel only, being thinner.
-pub fn lost(found: &Agreement, frame: &Frame, judge: &Truth<'_>, camera: &Camera) -> usize {
+/// Of some pixels those that show what is nowhere within a pixel, or nothing: some things are seen from one point of a
+/// pixel only, being thinner.
+pub fn lost(pixels: &[usize], frame: &Frame, judge: &Truth<'_>, camera: &Camera) -> usize {
     const RAYS: i32 = 24;
     let size = [frame.width, frame.height];
     let [corner, right, down] = camera.pixel_directions(size, 0);
-    let positions = frame.aovs.position.as_ref().unwrap();
+    let (mask, positions) = (frame.aovs.mask.as_ref().unwrap(), frame.aovs.position.as_ref().unwrap());
     let shown = |&&at: &&usize| {
         let place = Vec3::from_slice(&positions[3 * at..]).as_dvec3();
         let reach = 1.5 * right.length() * (place - camera.eye).dot(camera.forward());
         let (x, y) = ((at % size[0] as usize) as f64 + 0.5, (at / size[0] as usize) as f64 + 0.5);
-        (-RAYS..=RAYS).flat_map(|i| (-RAYS..=RAYS).map(move |j| (i, j))).any(|(i, j)| {
-            let [dx, dy] = [i, j].map(|k| f64::from(k) / f64::from(RAYS));
-            let hit = judge.first_hit(camera.eye, corner + right * (x + dx) + down * (y + dy));
-            hit.is_some_and(|hit| hit.position.distance(place) < reach)
-        })
+        mask[at] == 1
+            && (-RAYS..=RAYS).flat_map(|i| (-RAYS..=RAYS).map(move |j| (i, j))).any(|(i, j)| {
+                let [dx, dy] = [i, j].map(|k| f64::from(k) / f64::from(RAYS));
+                let hit = judge.seen(camera, corner + right * (x + dx) + down * (y + dy));
+                hit.is_some_and(|hit| hit.position.distance(place) < reach)
+            })
     };
-    found.astray.iter().filter(|at| !shown(at)).count()
+    pixels.iter().filter(|at| !shown(at)).count()
 }

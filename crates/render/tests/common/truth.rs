@@ -214,6 +214,11 @@ impl<'a> Truth<'a> {
         Some(Hit { t, position: origin + direction * t, uv, height: self.field.height_at(uv.x, uv.y) })
     }
 
+    /// What a camera sees in a direction that is 1 along its view axis.
+    pub fn seen(&self, camera: &Camera, direction: DVec3) -> Option<Hit> {
+        self.first_hit(camera.eye + direction * camera.near(), direction)
+    }
+
     /// The whole picture, row by row from the top.
     pub fn picture(&self, camera: &Camera, size: [u32; 2]) -> Vec<Option<Hit>> {
         let [corner, right, down] = camera.pixel_directions(size, 0);
@@ -221,7 +226,7 @@ impl<'a> Truth<'a> {
             .into_par_iter()
             .map(|at| {
                 let (x, y) = (f64::from(at % size[0]) + 0.5, f64::from(at / size[0]) + 0.5);
-                self.first_hit(camera.eye, corner + right * x + down * y)
+                self.seen(camera, corner + right * x + down * y)
             })
             .collect()
     }
