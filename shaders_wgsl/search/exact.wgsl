@@ -171,14 +171,9 @@ fn height_at(uv: vec2f) -> f32 {
     return surface_height(uv);
 }
 
-// As search, for a segment that may begin and end anywhere.
-fn search_within(start: vec3f, delta: vec3f) -> Found {
-    return trace(start, delta, false, true, WHOLE_STRETCH);
-}
-
-// The same for one that begins on the surface and leaves it.
-fn search_away_within(start: vec3f, delta: vec3f) -> Found {
-    return trace(start, delta, true, true, WHOLE_STRETCH);
+// As search, for a segment that may begin and end anywhere. leaves: whether it begins on the surface and leaves it.
+fn search_within(start: vec3f, delta: vec3f, leaves: bool) -> Found {
+    return trace(start, delta, leaves, true, WHOLE_STRETCH);
 }
 
 // How far outside of the heights that it met a hit may lie: on the surface, or it is none.

@@ -52,22 +52,29 @@ fn hidden(point: ShadowPoint, to_light: vec3f, distant: bool) -> Hidden {
     var stack: array<u32, TOP_STACK>;
     var height = 1u;
     var found = false;
-    while height > 0u && !found {
-        height -= 1u;
-        let node = top_nodes[stack[height]];
-        if enters_box(relative, inverse, node, 0.0, last) < 1e30 {
-            if node.count == INNER_NODE {
-                if height + 2u <= TOP_STACK {
+    // What is left of a leaf.
+    var item = 0u;
+    var end = 0u;
+    loop {
+        while height > 0u && item == end {
+            height -= 1u;
+            let node = top_nodes[stack[height]];
+            if enters_box(relative, inverse, node, 0.0, last) < 1e30 {
+                if node.count != INNER_NODE {
+                    item = node.first;
+                    end = item + node.count;
+                } else if height + 2u <= TOP_STACK {
                     stack[height] = node.first;
                     stack[height + 1u] = node.first + 1u;
                     height += 2u;
                 }
-            } else {
-                for (var i = 0u; i < node.count && !found; i++) {
-                    found = blocks(node.first + i, point, relative, direction, last);
-                }
             }
         }
+        if item == end || found {
+            break;
+        }
+        found = blocks(item, point, relative, direction, last);
+        item += 1u;
     }
     return Hidden(select(0.0, 1.0, found), SHADOW_RAYS);
 }

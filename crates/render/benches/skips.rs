@@ -17,8 +17,11 @@ use render::{Camera, Device, Draw, Light, Material, Renderer, Request, Scene, Sk
 
 #[path = "common/fractal.rs"]
 mod fractal;
+#[path = "common/worked.rs"]
+mod worked;
 
 use fractal::{SIZE, fractal};
+use worked::worked;
 
 /// Name, and what may be left out.
 fn kinds() -> [(&'static str, Skips); 8] {
@@ -37,16 +40,6 @@ fn kinds() -> [(&'static str, Skips); 8] {
 fn scene(draws: Vec<Draw<'_>>, camera: Camera) -> Scene<'_> {
     let sun = Light::Directional { direction: Vec3::new(-0.6, -0.5, -0.6), color: [1.0; 3], intensity: 0.9 };
     Scene { draws, camera, lights: vec![sun], ambient: [0.1; 3], background: [0.0; 4] }
-}
-
-/// Milliseconds that all threads of the process have worked.
-fn worked() -> f64 {
-    let Ok(threads) = std::fs::read_dir("/proc/self/task") else { return f64::NAN };
-    let nanoseconds = threads.flatten().filter_map(|thread| {
-        let text = std::fs::read_to_string(thread.path().join("schedstat")).ok()?;
-        text.split_whitespace().next()?.parse::<f64>().ok()
-    });
-    nanoseconds.sum::<f64>() * 1e-6
 }
 
 fn row(device: &Device, name: &str, scene: &Scene<'_>, technique: &str, rounds: usize) {

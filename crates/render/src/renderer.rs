@@ -40,7 +40,7 @@ pub struct Renderer<'a> {
     rows_at_once: u32,
     rooms: HashMap<usize, Room>,
     shared: Shared,
-    /// Where rays are traced through shells, from the first view on.
+    /// Where programs read them, from the first view on.
     solids: Option<SceneSolids>,
     draws: Vec<Option<Prepared>>,
     /// Samples along a side of a pixel; the request is for as many more pixels.
@@ -132,13 +132,12 @@ impl<'a> Renderer<'a> {
             rooms.entry(address(&draw.mesh)).or_insert_with(|| Room::of(&draw.mesh));
         }
         let rows_at_once = (band_pixels / u64::from(width)).clamp(1, u64::from(height)) as u32;
-        let shadows = request.shadows.unwrap_or(true) && request.technique.casts_shadows();
         let mut renderer = Self {
             rooms,
             across,
             central,
             solids: None,
-            shared: Shared::new(&device, scene.draws.len(), shadows)?,
+            shared: Shared::new(&device, scene.draws.len(), request.traces_light())?,
             draws: scene.draws.iter().map(|_| None).collect(),
             targets: Targets::new(&device, TargetSet::of(request.aovs), width, rows_at_once)?,
             frame: FrameBinding::new(&device, &scene)?,

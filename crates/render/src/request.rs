@@ -247,9 +247,19 @@ impl Request {
         Self { width, height, samples: 1, aovs: AovSet::NONE, ..self }
     }
 
+    /// Whether programs read meshes and heights as solids: to trace rays through them, or to shade what is displaced.
+    pub(crate) fn reads_solids(&self) -> bool {
+        self.in_shell() || self.technique.draws_geometry()
+    }
+
     /// Whether rays are traced through shells: for what is seen, or for shadows of what is displaced.
     pub(crate) fn traces_solids(&self) -> bool {
-        self.in_shell() || self.technique.draws_geometry()
+        self.in_shell() || (self.technique.draws_geometry() && self.traces_light())
+    }
+
+    /// Whether light rays are traced.
+    pub(crate) fn traces_light(&self) -> bool {
+        self.shadows.unwrap_or(true) && self.technique.casts_shadows()
     }
 
     /// Whether rays are traced through the shell.

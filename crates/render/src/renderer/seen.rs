@@ -24,7 +24,7 @@ impl Renderer<'_> {
             DMat4::from_translation(-camera.eye) * draw.world_from_object * DMat4::from_translation(middle);
         // What stays on the mesh covers the mesh, whatever depth it shows.
         let reach =
-            if self.request.traces_solids() { f64::from(draw.material.field.extent().scale) } else { 0.0 };
+            if self.request.reads_solids() { f64::from(draw.material.field.extent().scale) } else { 0.0 };
         let stand = Stand::new(relative, radius + reach, draw.material.double_sided);
         let seen = !draw.triangles.is_empty() && !culling.misses(relative.w_axis.truncate(), stand.radius);
         seen.then_some(stand)
@@ -52,18 +52,21 @@ impl Renderer<'_> {
         culling.settle_walls();
     }
 
-    /// Builds the solids of the scene where rays are traced through them and places them for a view: all of them, since
+    /// Builds the solids of the scene where programs read them and places them for a view: all of them, since
     /// what is outside the picture may throw a shadow into it. Gives for each draw what
     /// [`DrawInfo::own`] holds.
     fn place_solids(&mut self, camera: &Camera) -> Result<Vec<[u32; 2]>, RenderError> {
-        if !self.request.traces_solids() {
+        if !self.request.reads_solids() {
             return Ok(Vec::new());
         }
         let middle = |draw: &Draw<'_>| self.rooms.get(&address(&draw.mesh)).map(|room| room.middle);
         let middles: Vec<_> = self.scene.draws.iter().map(|draw| middle(draw).unwrap_or_default()).collect();
         let solids = match self.solids.take() {
             Some(solids) => solids,
-            None => SceneSolids::new(&self.device, &self.scene, &middles, &self.shared.places)?,
+            None => {
+                let traced = self.request.traces_solids();
+                SceneSolids::new(&self.device, &self.scene, &middles, &self.shared.places, traced)?
+            }
         };
         let away = DMat4::from_translation(-camera.eye);
         let relative = |(draw, middle): (&Draw<'_>, &DVec3)| {

@@ -84,6 +84,7 @@ impl Common {
         let mut infos = Vec::with_capacity(solids.len());
         for (solid, field) in solids {
             let [low, high] = solid.bounds;
+            let maxima = if solid.nodes.is_empty() { &[] } else { field.skip_pyramid().maxima() };
             infos.push(SolidInfo {
                 heights: height_info(field, true),
                 nodes: nodes.add(&solid.nodes),
@@ -92,7 +93,7 @@ impl Common {
                 vertices: vertices.add(&solid.arrays.vertices),
                 triangles: triangles.add(&solid.arrays.triangles),
                 corners: heights.add(field.corners()),
-                pyramid: heights.add(field.skip_pyramid().maxima()),
+                pyramid: heights.add(maxima),
                 endless: u32::from(!field.is_periodic()),
                 period: heightfield::march::period(field.wrap()) as f32,
                 radius: low.abs().max(high.abs()).max_element(),

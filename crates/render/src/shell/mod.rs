@@ -36,7 +36,7 @@ const MARGIN: f32 = 1e-3;
 const WIDER: f32 = 4e-6;
 
 /// Some triangles of a mesh in their relief, as rays meet them: prisms, strips between them, and a tree over both.
-/// Numbers count from its own first.
+/// Numbers count from its own first. Without nodes it cannot be traced.
 pub(crate) struct Solid {
     /// The mesh, all of it.
     pub arrays: Arc<MeshArrays>,
@@ -49,6 +49,12 @@ pub(crate) struct Solid {
 }
 
 impl Solid {
+    /// Only what is needed to shade what is seen of it otherwise.
+    pub fn untraced(arrays: Arc<MeshArrays>) -> Self {
+        let (nodes, prisms, strips) = Default::default();
+        Self { arrays, nodes, prisms, strips, bounds: [Vec3::ZERO; 2] }
+    }
+
     /// Builds the shell. `centre`: the middle of the mesh.
     ///
     /// # Errors

@@ -30,12 +30,13 @@ pub(crate) struct SceneSolids {
 
 impl SceneSolids {
     /// Builds what is not yet built, and uploads what is not yet on the device. `middles`: of the mesh of each draw;
-    /// `places`: of the draws in a view.
+    /// `places`: of the draws in a view; `traced`: whether rays will go through the solids.
     pub fn new(
         device: &Device,
         scene: &Scene<'_>,
         middles: &[DVec3],
         places: &wgpu::Buffer,
+        traced: bool,
     ) -> Result<Self, RenderError> {
         let mut solids = Vec::new();
         let mut numbers = HashMap::new();
@@ -46,7 +47,7 @@ impl SceneSolids {
             let number = match numbers.get(&(made_of, draw.triangles.clone())) {
                 Some(&number) => number,
                 None => {
-                    solids.push((device.solid(draw, *middle)?, field));
+                    solids.push((device.solid(draw, *middle, traced)?, field));
                     numbers.insert((made_of, draw.triangles.clone()), solids.len() - 1);
                     solids.len() - 1
                 }

@@ -15,8 +15,8 @@ use crate::triangles::MeshArrays;
 use crate::{Device, Draw, Held, RenderError};
 
 /// Mesh and field by their addresses, which their weak references keep from being given to anything else; and which
-/// triangles.
-type Key = (usize, usize, Range<u32>);
+/// triangles, and whether rays may be traced through them.
+type Key = (usize, usize, Range<u32>, bool);
 
 struct Kept {
     mesh: Weak<Mesh>,
@@ -49,19 +49,31 @@ impl Store {
 }
 
 impl Device {
-    /// The solid of a draw, built if there is none. Those of meshes that are only lent are not kept.
-    pub(super) fn solid(&self, draw: &Draw<'_>, centre: DVec3) -> Result<Arc<Solid>, RenderError> {
+    /// The solid of a draw, built if there is none; with what rays need where they are to be `traced`. Those of meshes
+    /// that are only lent are not kept.
+    pub(super) fn solid(
+        &self,
+        draw: &Draw<'_>,
+        centre: DVec3,
+        traced: bool,
+    ) -> Result<Arc<Solid>, RenderError> {
         let field = &draw.material.field;
         let build = |arrays: Option<Arc<MeshArrays>>| {
             let arrays = arrays.unwrap_or_else(|| Arc::new(MeshArrays::new(&draw.mesh, centre)));
+            if !traced {
+                return Ok(Arc::new(Solid::untraced(arrays)));
+            }
             Solid::new(arrays, &draw.mesh, &draw.triangles, field, centre).map(Arc::new)
         };
         let Held::Shared(mesh) = &draw.mesh else { return build(None) };
-        let key = (Arc::as_ptr(mesh) as usize, Arc::as_ptr(field) as usize, draw.triangles.clone());
+        let key = |traced| {
+            (Arc::as_ptr(mesh) as usize, Arc::as_ptr(field) as usize, draw.triangles.clone(), traced)
+        };
         let arrays = {
             let mut store = lock(&self.solids);
             store.tidy();
-            if let Some(kept) = store.kept.get(&key) {
+            let ready = store.kept.get(&key(true));
+            if let Some(kept) = ready.or_else(|| store.kept.get(&key(false)).filter(|_| !traced)) {
                 return Ok(Arc::clone(&kept.solid));
             }
             store.arrays(mesh)
@@ -70,7 +82,7 @@ impl Device {
         let solid = build(arrays)?;
         let kept =
             Kept { mesh: Arc::downgrade(mesh), field: Arc::downgrade(field), solid: Arc::clone(&solid) };
-        lock(&self.solids).kept.insert(key, kept);
+        lock(&self.solids).kept.insert(key(traced), kept);
         Ok(solid)
     }
 
