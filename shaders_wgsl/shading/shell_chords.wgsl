@@ -11,6 +11,8 @@
 // How far a chord may be from the curve, in texels and in heights.
 const SAG: vec2f = vec2f(0.02, 5e-4);
 const MAX_CHORDS: f32 = 48.0;
+// Chords, and parts of them between places where a ray meets the surface from behind.
+const MAX_PARTS: u32 = 80u;
 // Light rays meet nothing of the sheet they start on on their first so many cells, unless they are below the surface at
 // the end of them. Creases between cells are no part of what the texels stand for, and the shading, whose slopes are
 // smooth, knows none.
@@ -48,14 +50,23 @@ fn search_prism(ray: ShellRay, crossing: Crossing, best: ShellHit) -> ShellHit {
 
     var here = span.enter;
     var start = enter;
+    var there = here;
+    var end = start;
     var inside = false;
-    for (var chord = 0.0; chord < chords; chord += 1.0) {
-        var there = span.leave;
-        var end = leave;
-        if chord + 1.0 < chords {
-            let share = (chord + 1.0) / chords;
-            there = prism_point(prism, mix(span.enter.t, span.leave.t, share), mix_points(span.enter, span.leave, share));
-            end = in_texture(there, uvs, prism);
+    var leaves = false;
+    var chord = 0.0;
+    var goes_on_to_next = true;
+    for (var part = 0u; part < MAX_PARTS; part++) {
+        if goes_on_to_next {
+            there = span.leave;
+            end = leave;
+            chord += 1.0;
+            if chord < chords {
+                let share = chord / chords;
+                let guess = mix_points(span.enter, span.leave, share);
+                there = prism_point(prism, mix(span.enter.t, span.leave.t, share), guess);
+                end = in_texture(there, uvs, prism);
+            }
         }
         // No branch on what is the same for the whole draw: Mesa 22.3 takes such branches out of loops, and fails.
         let periodic = solid.period > 0.0;
@@ -65,62 +76,58 @@ fn search_prism(ray: ShellRay, crossing: Crossing, best: ShellHit) -> ShellHit {
         let length_in_cells = max(length(delta.xy * size), 1e-30);
         // Share of the chord that is still next to the start.
         let done = here.t / max(there.t - here.t, 1e-30);
-        let beside = select(0.0, min(CREASE / length_in_cells - done, 1.0), crossing.own_sheet);
-        var skipped = max(beside, 0.0);
-        var leaves = false;
-        if chord == 0.0 || skipped > 0.0 {
+        let skipped = max(select(0.0, min(CREASE / length_in_cells - done, 1.0), crossing.own_sheet), 0.0);
+        if part == 0u || skipped > 0.0 {
             let gap = gap_above(home + delta * skipped);
-            if skipped > 0.0 {
-                inside = gap <= 0.0;
-            } else {
-                inside = gap < -slack;
-                leaves = abs(gap) <= slack;
-                if inside && crossing.from_next && !ray.for_shadow && gap >= -ROUNDED_BELOW {
-                    // One that is coming out was below before.
-                    inside = gap_above(home + delta * min(NEXT / length_in_cells, 1.0)) > gap;
-                }
+            inside = gap <= select(-slack, 0.0, skipped > 0.0);
+            leaves = skipped == 0.0 && abs(gap) <= slack;
+            if inside && crossing.from_next && !ray.for_shadow && gap >= -ROUNDED_BELOW {
+                // One that is coming out was below before.
+                inside = gap_above(home + delta * min(NEXT / length_in_cells, 1.0)) > gap;
             }
         }
-        var searches = true;
-        var meets = false;
-        var from_inside = false;
-        if skipped > 0.0 {
-            searches = skipped < 1.0 && !inside;
-            meets = inside && (skipped < 1.0 || delta.z <= 0.0);
+        // Where the surface is crossed.
+        var tau = 2.0;
+        if skipped > 0.0 && inside {
+            tau = select(2.0, skipped, skipped < 1.0 || delta.z <= 0.0);
         } else if inside {
-            skipped = emerges(home, delta);
-            inside = skipped > 1.0;
-            from_inside = !inside && (sees_inside || ray.for_shadow);
-            meets = from_inside;
-            searches = !inside && !meets && skipped < 1.0;
-            leaves = searches;
-        }
-        var tau = skipped;
-        if searches {
+            tau = emerges(home, delta);
+        } else if skipped < 1.0 {
             let found = search_within(home + delta * skipped, delta * (1.0 - skipped), leaves);
             result.steps += found.steps;
-            tau = skipped + (1.0 - skipped) * found.tau;
-            meets = found.status == 0u;
-            if found.status == 2u {
+            if found.status == 0u {
+                tau = skipped + (1.0 - skipped) * found.tau;
+            } else if found.status == 2u {
                 result.status = 2u;
             }
         }
-        let t = mix(here.t, there.t, tau);
-        if meets && t < best.t {
-            let point = prism_point(prism, t, mix_points(here, there, tau));
-            result.found = true;
-            result.inside = from_inside;
-            result.status = 0u;
-            result.t = t;
-            result.face = crossing.face;
-            result.strip = PRISM;
-            result.weights = point.weights;
-            return result;
+        leaves = false;
+        goes_on_to_next = tau > 1.0;
+        if goes_on_to_next {
+            here = there;
+            start = end;
+        } else {
+            here = prism_point(prism, mix(here.t, there.t, tau), mix_points(here, there, tau));
+            start = mix(start, end, tau);
         }
-        here = there;
-        start = end;
-        if here.t >= best.t {
+        if here.t >= best.t || (goes_on_to_next && chord >= chords) {
             break;
+        }
+        if !goes_on_to_next {
+            // Where normals meet before the relief ends the shell is folded: there the front of the surface looks down.
+            let from_behind = inside != (prism_volume(prism, here) < 0.0);
+            if !from_behind || sees_inside || ray.for_shadow {
+                result.found = true;
+                result.inside = from_behind;
+                result.status = 0u;
+                result.t = here.t;
+                result.face = crossing.face;
+                result.strip = PRISM;
+                result.weights = here.weights;
+                break;
+            }
+            inside = !inside;
+            leaves = !inside;
         }
     }
     return result;

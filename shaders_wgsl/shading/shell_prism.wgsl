@@ -22,6 +22,15 @@ fn in_texture(point: PrismPoint, uvs: mat3x2f, prism: Prism) -> vec3f {
     return vec3f(uvs * w, height_info.base + point.rise * length(normal) / height_info.scale);
 }
 
+// How much room the prism takes around a point, for steps in weights and rise; negative where it is turned inside out.
+fn prism_volume(prism: Prism, point: PrismPoint) -> f32 {
+    let m1 = prism.n1 - prism.n0;
+    let m2 = prism.n2 - prism.n0;
+    let along_1 = prism.p1 - prism.p0 + point.rise * m1;
+    let along_2 = prism.p2 - prism.p0 + point.rise * m2;
+    return dot(cross(along_1, along_2), prism.n0 + point.weights.x * m1 + point.weights.y * m2);
+}
+
 // Where a ray goes through a prism before `last`.
 fn cross_prism(ray: ShellRay, shell_prism: ShellPrism, last: f32) -> Crossing {
     let a = corner_of(shell_prism.face, 0u);

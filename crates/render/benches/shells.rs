@@ -5,7 +5,7 @@
 //! the displaced surface in double precision, on small pictures: "outline": pixels covered in only one of the two although
 //! the outline is more than a pixel away; "place": distance between what is seen, pixels, ninety-ninth percentile away
 //! from jumps in depth. `ONLY` names meshes.
-#![allow(clippy::unwrap_used, missing_docs)]
+#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
 #[path = "../tests/common/mod.rs"]
 mod common;

@@ -24,6 +24,7 @@ mod layouts;
 pub mod march;
 mod materials;
 mod micro;
+mod pieces;
 mod pipeline;
 pub mod plain;
 mod prepare;

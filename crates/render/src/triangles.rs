@@ -1,5 +1,8 @@
 //! A mesh as shaders read it that find out for themselves which triangle they see.
 
+use std::collections::HashMap;
+use std::ops::Range;
+
 use glam::DVec3;
 use mesh::Mesh;
 use rayon::prelude::*;
@@ -15,6 +18,14 @@ pub(crate) struct MeshArrays {
     /// Corners of each triangle; the number of its sheet, and from [`GOES_ON`] on a bit for each edge beyond which the
     /// sheet goes on.
     pub triangles: Vec<[u32; 4]>,
+    /// Of triangles that are cut, the numbers of their pieces, which follow all triangles.
+    pub pieces: HashMap<u32, Range<u32>>,
+}
+
+/// A sheet's number with a bit for each edge beyond which it goes on.
+pub(crate) fn beyond(sheet: u32, goes_on: [bool; 3]) -> u32 {
+    let number = sheet & ((1 << GOES_ON) - 1);
+    (0..3).fold(number, |sum, edge| sum | u32::from(goes_on[edge]) << (GOES_ON + edge))
 }
 
 impl MeshArrays {
@@ -36,9 +47,11 @@ impl MeshArrays {
         let sheets = mesh::sheets(mesh);
         let triangle = |face: usize| {
             let [a, b, c] = mesh.indices[face];
-            let edges = (0..3).map(|edge| u32::from(sheets.goes_on[face][edge]) << (GOES_ON + edge));
-            [a, b, c, edges.fold(sheets.of[face], |sum, bit| sum | bit)]
+            [a, b, c, beyond(sheets.of[face], sheets.goes_on[face])]
         };
-        Self { vertices, triangles: (0..mesh.indices.len()).map(triangle).collect() }
+        let triangles = (0..mesh.indices.len()).map(triangle).collect();
+        let mut arrays = Self { vertices, triangles, pieces: HashMap::new() };
+        arrays.cut(&sheets.goes_on);
+        arrays
     }
 }

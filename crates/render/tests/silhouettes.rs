@@ -10,7 +10,7 @@ mod common;
 use common::agree::{agreement, as_truth, from, lost, row, show};
 use common::shapes::{SIZE, heights, picture, scene_picture, shapes};
 use common::truth::Truth;
-use glam::DVec3;
+use glam::{DVec3, Vec2, Vec3};
 use mesh::Mesh;
 use render::{Camera, Draw, Material};
 
@@ -37,6 +37,43 @@ fn relief_in_the_shell_is_the_displaced_surface() {
             assert!(found.far < 0.001, "{name} {base}: {found:?}");
             assert_eq!(frame.stats.pixels_unconverged, 0);
         }
+    }
+}
+
+/// A cube with one normal a corner: on its sides normals are up to 109 degrees apart, and a ray may go through the prism over
+/// a whole side more than once.
+#[test]
+fn normals_may_fan_out() {
+    let Some(device) = common::device() else { return };
+    let at = |bits: u32| Vec3::from([0, 1, 2].map(|axis| if bits >> axis & 1 == 0 { -0.4 } else { 0.4 }));
+    let (mut places, mut normals, mut uvs) = (Vec::new(), Vec::new(), Vec::new());
+    let mut triangles = Vec::new();
+    for side in 0..6_u32 {
+        let (axis, far) = (side / 2, side % 2);
+        let [u, v] =
+            if far == 1 { [(axis + 1) % 3, (axis + 2) % 3] } else { [(axis + 2) % 3, (axis + 1) % 3] };
+        let first = places.len() as u32;
+        for corner in 0..4_u32 {
+            let place = at(far << axis | (corner & 1) << u | (corner >> 1) << v);
+            places.push(place);
+            normals.push(place.normalize());
+            uvs.push(Vec2::new((corner & 1) as f32, (corner >> 1) as f32));
+        }
+        triangles.extend([[first, first + 1, first + 3], [first, first + 3, first + 2]]);
+    }
+    let mesh = common::mesh_of(&places, &normals, &uvs, &triangles);
+    let texels = [48, 48];
+    for base in [0.0, 1.0] {
+        let (field, camera) = (heights(texels, 0.08, base), from([1.0, 0.9, 1.4]));
+        let judge = Truth::new(&mesh, &field);
+        let truth = judge.picture(&camera, SIZE);
+        let frame = picture(&device, &mesh, &field, camera, "exact", true);
+        show(&frame, &format!("smooth_cube_{base}"));
+        let found = agreement(&frame, &truth, &camera, texels);
+        row("smooth cube", base, &found);
+        assert!(found.both > 1500 && found.outline_off.is_empty(), "{base}: {found:?}");
+        assert!(found.place_p99 < 0.1 && found.far < 0.002, "{base}: {found:?}");
+        assert_eq!(lost(&found.astray, &frame, &judge, &camera), 0, "{base}: {found:?}");
     }
 }
 

@@ -28,8 +28,8 @@ use crate::uniforms::{PLAIN, PRISM, ShellNode, ShellPrism};
 pub(crate) use self::scene::SceneSolids;
 pub(crate) use self::store::Store;
 
-/// Shortest interpolated normal that is made up for: corners whose normals are 169 degrees apart.
-const SHORTEST_NORMAL: f32 = 0.1;
+/// Shortest interpolated normal that is made up for: corners whose normals are 178 degrees apart.
+const SHORTEST_NORMAL: f32 = 0.02;
 /// Share of the relief by which prisms are higher and deeper than the heights in them.
 const MARGIN: f32 = 1e-3;
 /// Share of the mesh's size by which boxes are wider, so that rounding hides nothing.
@@ -67,7 +67,7 @@ impl Solid {
         centre: DVec3,
     ) -> Result<Self, RenderError> {
         let mut made = if field.extent().scale > 0.0 {
-            prisms(mesh, triangles, field, centre)
+            prisms(&arrays, triangles, field)
         } else {
             bare(mesh, triangles, centre)
         };
@@ -106,19 +106,15 @@ fn bare(mesh: &Mesh, triangles: &Range<u32>, centre: DVec3) -> Vec<(ShellPrism, 
     triangles.clone().into_par_iter().map(one).collect()
 }
 
-/// A prism on each triangle.
-fn prisms(
-    mesh: &Mesh,
-    triangles: &Range<u32>,
-    field: &HeightField,
-    centre: DVec3,
-) -> Vec<(ShellPrism, Bounds)> {
+/// A prism on each triangle, or on its pieces.
+fn prisms(arrays: &MeshArrays, triangles: &Range<u32>, field: &HeightField) -> Vec<(ShellPrism, Bounds)> {
     let extent = field.extent();
     let heights = HeightBounds::new(field);
     let one = |face: u32| {
-        let corners = mesh.indices[face as usize].map(|at| at as usize);
-        let normals = corners.map(|at| mesh.normals[at]);
-        let [low, high] = heights.over(corners.map(|at| mesh.uvs[at]));
+        let [a, b, c, _] = arrays.triangles[face as usize];
+        let corners = [a, b, c].map(|at| &arrays.vertices[at as usize]);
+        let normals = corners.map(|corner| corner.up.truncate());
+        let [low, high] = heights.over(corners.map(|corner| Vec2::new(corner.place.w, corner.up.w)));
         let longest = 1.0 / nearest_to_origin(normals).max(SHORTEST_NORMAL);
         let rise = |height: f32| {
             let rise = extent.scale * (height - extent.base);
@@ -127,13 +123,14 @@ fn prisms(
         let [a, b] = rise(low - MARGIN);
         let [c, d] = rise(high + MARGIN);
         let prism = ShellPrism { face, low: a.min(b), high: c.max(d), strip: PRISM };
-        let around = corners.iter().fold(Bounds::NONE, |around, &at| {
-            let foot = (mesh.positions[at].as_dvec3() - centre).as_vec3();
-            around.with(foot + prism.low * mesh.normals[at]).with(foot + prism.high * mesh.normals[at])
+        let around = corners.iter().zip(normals).fold(Bounds::NONE, |around, (corner, normal)| {
+            let foot = corner.place.truncate();
+            around.with(foot + prism.low * normal).with(foot + prism.high * normal)
         });
         (prism, around)
     };
-    triangles.clone().into_par_iter().map(one).collect()
+    let parts = |face: u32| arrays.pieces.get(&face).cloned().unwrap_or(face..face + 1);
+    triangles.clone().into_par_iter().flat_map_iter(|face| parts(face).map(one)).collect()
 }
 
 /// Distance from the origin to a triangle.
