@@ -105,6 +105,29 @@ fn a_flat_map_has_no_horizon_and_steepness_no_nan() {
     assert_eq!(bake(&one, 3), [0.0; 3]);
 }
 
+/// Lines that pass beside a texel run over the pit; their eyes must not be taken for the texel's.
+#[test]
+fn a_pit_raises_no_horizon_beside_it() {
+    for (size, wrap) in [([48, 40], Wrap::Repeat), ([33, 47], Wrap::Clamp), ([40, 40], Wrap::Mirror)] {
+        let mut texels = vec![1.0; size[0] * size[1]];
+        let pits = [7 * size[0] + 19, 25 * size[0] + 9, 25 * size[0] + 11];
+        for pit in pits {
+            texels[pit] = 0.0;
+        }
+        let map = bake(&field(&texels, size, wrap, 0.3, [1.0, 1.0]), 32);
+        for (at, &sine) in map.iter().enumerate() {
+            let pit = pits.contains(&(at % texels.len()));
+            assert_eq!(
+                sine > 5e-6,
+                pit,
+                "{wrap:?}, azimuth {}, texel {}: {sine}",
+                at / texels.len(),
+                at % texels.len()
+            );
+        }
+    }
+}
+
 /// A wall along x, `d` rows away, rises by `scale sin(a) / distance` at azimuth `a`.
 #[test]
 fn an_endless_wall_stands_at_the_known_angle() {

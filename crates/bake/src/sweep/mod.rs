@@ -188,16 +188,33 @@ impl lanes::Kernel for RowOfTexels<'_> {
         let (before, own, after) = near::neighbours(plan, grid, step);
         let (before, own, after) = (&before[..n], &own[..n], &after[..n]);
         let (rises, nearness) = (&rises[..=n], &nearness[..=n]);
-        let bulge = share * (1.0 - share);
+        let (before_share, after_share) = (share, 1.0 - share);
         for j in 0..n {
-            // How much higher the texel is than what its two lines say of it.
-            let excess = bulge * (2.0 * own[j] - before[j] - after[j]);
+            // How much higher the texel is than each of its lines, and than what the two say of it.
+            let over_a = (own[j] - before[j]) * before_share;
+            let over_b = (own[j] - after[j]) * after_share;
+            let excess = over_a + (over_b - over_a) * share;
             let a = sine((rises[j] - excess * nearness[j]) * slope);
             let b = sine((rises[j + 1] - excess * nearness[j + 1]) * slope);
-            let (near, far) = (sine(out[j] * slope), a + (b - a) * share);
-            out[j] = if near > far { near } else { far };
+            // What either line shows seen from the texel: a pit or a post beside it must not raise that.
+            let most = larger(rises[j] - over_a * nearness[j], rises[j + 1] - over_b * nearness[j + 1]);
+            let far = smaller(a + (b - a) * share, sine(most * slope));
+            let near = sine(out[j] * slope);
+            out[j] = larger(near, far);
         }
     }
+}
+
+/// The larger of two numbers, neither of which is NaN: one instruction.
+#[inline(always)]
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// The smaller of two numbers, neither of which is NaN.
+#[inline(always)]
+fn smaller(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
 }
 
 /// Sine of the elevation of a slope; 0 for one that falls.

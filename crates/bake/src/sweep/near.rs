@@ -1,7 +1,7 @@
 //! The first steps of an azimuth, texel by texel.
 
 use super::plan::Sample;
-use super::{Grid, Plan};
+use super::{Grid, Plan, larger};
 
 /// The steepest rise within the near steps, height per step and at least 0, for the row of texels
 /// `step` steps along.
@@ -40,12 +40,6 @@ pub(super) fn rises(plan: &Plan, grid: &Grid, step: i64, out: &mut [f32]) {
             }
         }
     }
-}
-
-/// The larger of two numbers, neither of which is NaN: one instruction.
-#[inline(always)]
-fn larger(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
 }
 
 /// Heights of the texels before, at and after each texel of a row on the cross axis.
