@@ -35,7 +35,7 @@ pub static HORIZON: Map = Map {
         name: "horizon",
         summary: "sine of the horizon's elevation, 0..1, one slice an azimuth, from +X towards +Y (up)",
         source: "Max 1988; Timonen and Westerholm 2010",
-        version: 2,
+        version: 3,
         costly: true,
         form: Form::Stack { axis: "azimuth" },
         channels: &[Channel::fixed("sine", Range::UNIT)],

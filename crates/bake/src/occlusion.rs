@@ -30,7 +30,7 @@ pub static AO: Map = Map {
         name: "ao",
         summary: "ambient occlusion: share of an even sky's light, 0 enclosed to 1 open",
         source: "Timonen and Westerholm 2010",
-        version: 3,
+        version: 4,
         costly: true,
         form: Form::Single,
         channels: &[Channel::fixed("ao", Range::UNIT)],
@@ -49,7 +49,7 @@ pub static BENT_NORMAL: Map = Map {
         name: "bent_normal",
         summary: "mean direction of the open sky, unit x, y, z in -1..1",
         source: "Landis 2002; Timonen and Westerholm 2010",
-        version: 3,
+        version: 4,
         costly: true,
         form: Form::Single,
         channels: &[

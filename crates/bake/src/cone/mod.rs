@@ -108,7 +108,7 @@ pub static RELAXED_CONE: Map = Map {
         name: "relaxed_cone",
         summary: "how far a cone that a ray pierces at most once opens, UV units per height unit, 0..1",
         source: "Policarpo and Oliveira 2007; Ban, Valasek, Balint and Vad 2024",
-        version: 4,
+        version: 5,
         costly: true,
         form: Form::Single,
         channels: &[Channel::fixed("ratio", Range::LOWER_BOUND)],

@@ -1,24 +1,26 @@
 //! Cells as what cones stand on: see the module above.
 
-use super::super::exact::FLATTEST;
-use super::super::grid::Grid;
-use super::near::near_falling;
-use super::packet::Apex;
-use super::patch::{Patch, cuts, steepest};
+use heightfield::lanes::Lanes;
 
-/// A cell, named by its upper left texel.
+use super::super::exact::FLATTEST;
+use super::super::exact::lattice::Lattice;
+use super::super::grid::{Grid, Stack};
+use super::near::near_falling;
+use super::packet::Packet;
+use super::patch::{self, Patch, cuts};
+use super::{Apexes, Row};
+
+/// Cells, each named by its upper left texel.
 #[derive(Clone, Copy)]
-pub(super) struct Cell<'a> {
+pub(super) struct Cells<'a> {
     pub grid: &'a Grid<'a>,
+    pub lattice: &'a Lattice,
     /// Slopes of the texels' empty cones, and how many there are.
     pub empty: &'a [f32],
     pub size: [usize; 2],
 }
 
-impl Apex for Cell<'_> {
-    const EXTENT: f32 = 1.0;
-    const LID: bool = false;
-
+impl Apexes for Cells<'_> {
     /// Enough are the steepest empty cones of the texels that the cell belongs to.
     fn start(self, [i, j]: [i64; 2], site: [i64; 2]) -> [f32; 2] {
         let [width, height] = self.size;
@@ -32,17 +34,41 @@ impl Apex for Cell<'_> {
     }
 
     #[inline(always)]
-    fn touches(offset: [i64; 2]) -> bool {
-        offset[0].abs() <= 1 && offset[1].abs() <= 1
+    fn raise<L: Lanes>(self, row: Row<'_>, stack: &mut Stack) {
+        let [i, j] = row.texel;
+        let heights = [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[x, y]| self.lattice.from(i + x, j + y));
+        let mut packet = Packet::<L>::new(self.grid, row.site, heights, row.slopes, row.enough);
+        for (lane, &partner) in row.partners.iter().enumerate() {
+            if let Some(partner) = partner {
+                packet.seed(lane, partner);
+            }
+        }
+        packet.search(stack);
+        row.slopes.copy_from_slice(&packet.slopes[..L::WIDTH]);
+        row.partners.copy_from_slice(&packet.partners[..L::WIDTH]);
     }
+}
 
-    fn steepest(self, _: [i64; 2], own: [f32; 4], offset: [i64; 2], heights: [f32; 4], known: f64) -> f64 {
-        let step = self.grid.step.map(f64::from);
-        let at = |[i, j]: [i64; 2], heights: [f32; 4]| Patch {
-            low: [i as f64 * step[0], j as f64 * step[1]],
-            high: [(i + 1) as f64 * step[0], (j + 1) as f64 * step[1]],
-            heights: heights.map(f64::from),
-        };
-        steepest(&at([0, 0], own), &at(offset, heights), cuts(offset), known)
-    }
+/// Whether the cell at this offset is so close that it is known beforehand.
+#[inline(always)]
+pub(super) fn touches(offset: [i64; 2]) -> bool {
+    offset[0].abs() <= 1 && offset[1].abs() <= 1
+}
+
+/// The steepest rise from a cell with these corner heights to where the cell at `offset` with its own falls outwards, or
+/// `known` if that is not less.
+pub(super) fn steepest(
+    grid: &Grid<'_>,
+    own: [f32; 4],
+    offset: [i64; 2],
+    heights: [f32; 4],
+    known: f64,
+) -> f64 {
+    let step = grid.step.map(f64::from);
+    let at = |[i, j]: [i64; 2], heights: [f32; 4]| Patch {
+        low: [i as f64 * step[0], j as f64 * step[1]],
+        high: [(i + 1) as f64 * step[0], (j + 1) as f64 * step[1]],
+        heights: heights.map(f64::from),
+    };
+    patch::steepest(&at([0, 0], own), &at(offset, heights), cuts(offset), known)
 }

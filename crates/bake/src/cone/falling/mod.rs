@@ -11,11 +11,15 @@
 //! rise that is there. That much is added, so ratios are never too wide.
 //!
 //! No relaxed cone needs to be narrower than the empty one: a cell as steep as its texels' empty cones is done with.
+//!
+//! The published construction is here by its name, for comparison: [`texels`].
 
+mod blocks;
 mod cells;
 mod near;
 mod packet;
 mod patch;
+mod rays;
 mod texels;
 
 use heightfield::HeightField;
@@ -25,9 +29,9 @@ use rayon::prelude::*;
 use super::exact::lattice::{Lattice, Plane, ROUND};
 use super::grid::{Grid, Sites, Stack};
 use crate::{BakeError, Progress, maps};
-use cells::Cell;
-use packet::{Apex, NOBODY, Packet};
-use texels::Texel;
+use blocks::Blocks;
+use cells::Cells;
+use texels::Texels;
 
 /// How much steeper than necessary a rise may be given, times the rise.
 const TOLERANCE: f64 = 1.0 / 256.0;
@@ -41,8 +45,8 @@ const BATCH: usize = 8;
 pub(super) fn working_bytes(grid: maps::Grid) -> u128 {
     let area = |more: usize| (grid.width + more) as u128 * (grid.height + more) as u128;
     let cells: u128 = grid.cells().map(|n| n as u128).iter().product();
-    // Heights and slopes with their margins, the empty cones, tiles.
-    4 * (area(2 * ROUND) + area(ROUND + 2) + area(0) + cells)
+    // Heights and slopes with their margins, the empty cones; tiles or blocks.
+    4 * (area(2 * ROUND) + area(ROUND + 2) + area(0)) + blocks::bytes(cells)
 }
 
 /// The steepest rises that count, one a texel, row by row, none of them above `empty`, those of empty cones.
@@ -52,8 +56,9 @@ pub(super) fn steepest_rises(
     progress: &mut Progress<'_>,
 ) -> Result<Vec<f32>, BakeError> {
     let grid = &Grid::new(field, Sites::Cells);
-    let cell = Cell { grid, empty: &empty, size: [field.width(), field.height()] };
-    let cells = search(field, grid, cell, progress)?;
+    let lattice = &Lattice::new(field);
+    let size = [field.width(), field.height()];
+    let cells = search(field, Cells { grid, lattice, empty: &empty, size }, progress)?;
     empty.par_chunks_mut(field.width()).enumerate().for_each(|(j, row)| {
         let (upper, lower) = (cells.row(j as i64 - 1), cells.row(j as i64));
         for (i, slope) in row.iter_mut().enumerate() {
@@ -69,21 +74,40 @@ pub(super) fn steepest_between_texels(
     progress: &mut Progress<'_>,
 ) -> Result<Vec<f32>, BakeError> {
     let (width, height) = (field.width(), field.height());
-    let grid = &Grid::new(field, Sites::Cells);
-    let texel = Texel { field, step: [width, height].map(|n| 1.0 / n as f64) };
-    let texels = search(field, grid, texel, progress)?;
+    let blocks = &Blocks::new(field);
+    let step = [width, height].map(|n| 1.0 / n as f64);
+    let texels = search(field, Texels { field, blocks, step }, progress)?;
     Ok((0..height as i64).flat_map(|j| texels.row(j)[1..][..width].iter().copied()).collect())
 }
 
+/// What cones stand on.
+trait Apexes: Copy + Sync {
+    /// What is known beforehand of the one at this texel and site, and a slope above which nobody wants to know more.
+    fn start(self, texel: [i64; 2], site: [i64; 2]) -> [f32; 2];
+
+    /// Finds the steepest rises of as many in a row as there are lanes.
+    fn raise<L: Lanes>(self, row: Row<'_>, stack: &mut Stack);
+}
+
+/// Apexes in a row and what is known of them.
+struct Row<'a> {
+    /// The first, as a texel and as a site.
+    texel: [i64; 2],
+    site: [i64; 2],
+    slopes: &'a mut [f32],
+    /// Slopes above which nobody wants to know more.
+    enough: &'a [f32],
+    /// Where the steepest rise may lead to, as a site, and then where one was found; may lie on another period.
+    partners: &'a mut [Option<[i32; 2]>],
+}
+
 /// The slope of each apex, by texel from column and row -1 on.
-fn search<A: Apex>(
+fn search<A: Apexes>(
     field: &HeightField,
-    grid: &Grid<'_>,
-    apex: A,
+    apexes: A,
     progress: &mut Progress<'_>,
 ) -> Result<Plane, BakeError> {
     let (width, height) = (field.width(), field.height());
-    let lattice = &Lattice::new(field);
     let first = -field.first_texel();
     let mut plane = Plane::new(width, height, 0.0);
     let stride = plane.stride;
@@ -92,7 +116,7 @@ fn search<A: Apex>(
         let done = batch * BATCH * STRIP;
         rows.par_chunks_mut(STRIP * stride).enumerate().for_each(|(strip, slopes)| {
             let top = (done + strip * STRIP) as i64 - 1;
-            dispatch(Strip { grid, lattice, apex, first, top, width, slopes });
+            dispatch(Strip { apexes, first, top, stride, slopes });
         });
         progress.report(done + rows.len() / stride, height + 2)?;
     }
@@ -101,57 +125,45 @@ fn search<A: Apex>(
 
 /// Rows of apexes from `top` on.
 struct Strip<'a, A> {
-    grid: &'a Grid<'a>,
-    lattice: &'a Lattice,
-    apex: A,
+    apexes: A,
     /// The site of texel 0.
     first: i64,
     top: i64,
-    width: usize,
+    stride: usize,
     slopes: &'a mut [f32],
 }
 
-impl<A: Apex> Kernel for Strip<'_, A> {
+impl<A: Apexes> Kernel for Strip<'_, A> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let Self { grid, lattice, apex, first, top, width, slopes } = self;
-        let stride = (width + 2).next_multiple_of(ROUND);
+        let Self { apexes, first, top, stride, slopes } = self;
         let mut stack = Stack::new();
-        let mut partners = vec![NOBODY; stride];
+        let mut partners = vec![None; stride];
         for (j, row) in (top..).zip(slopes.chunks_exact_mut(stride)) {
-            let mut beside = NOBODY;
+            let mut beside = None;
             for (at, slopes) in row.chunks_exact_mut(L::WIDTH).enumerate() {
-                let column = at * L::WIDTH;
-                let i = column as i64 - 1;
+                let i = (at * L::WIDTH) as i64 - 1;
+                let partners = &mut partners[at * L::WIDTH..][..L::WIDTH];
                 let mut enough = [0.0; ROUND];
                 for (lane, (slope, enough)) in slopes.iter_mut().zip(&mut enough).enumerate() {
                     let texel = [i + lane as i64, j];
-                    [*slope, *enough] = apex.start(texel, texel.map(|at| at + first));
+                    [*slope, *enough] = apexes.start(texel, texel.map(|at| at + first));
                 }
                 if slopes.iter().zip(&enough).all(|(slope, enough)| slope >= enough) {
-                    beside = NOBODY;
-                    partners[column..][..L::WIDTH].fill(NOBODY);
+                    beside = None;
+                    partners.fill(None);
                     continue;
                 }
-                // The other corners of texels are the same.
-                let away = |x: i64| if A::EXTENT > 0.0 { x } else { 0 };
-                let heights =
-                    [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[x, y]| lattice.from(i + away(x), j + away(y)));
-                let site = [i + first, j + first];
-                let mut packet = Packet::<L, A>::new(grid, apex, site, heights, slopes, &enough);
-                for lane in 0..L::WIDTH {
-                    let above = partners[column + lane];
-                    let partner = if above == NOBODY { beside } else { above };
-                    if partner != NOBODY {
-                        packet.seed(lane, partner);
-                    }
+                for partner in partners.iter_mut() {
+                    *partner = partner.or(beside);
                 }
-                packet.search(&mut stack);
-                slopes.copy_from_slice(&packet.slopes[..L::WIDTH]);
-                beside = packet.partners[L::WIDTH - 1];
-                partners[column..][..L::WIDTH].copy_from_slice(&packet.partners[..L::WIDTH]);
+                let (texel, site) = ([i, j], [i + first, j + first]);
+                let enough = &enough[..L::WIDTH];
+                let row = Row { texel, site, slopes, enough, partners: &mut *partners };
+                apexes.raise::<L>(row, &mut stack);
+                beside = partners[L::WIDTH - 1];
             }
         }
     }

@@ -55,15 +55,11 @@ fn ends_falling([u, v]: [f32; 2], least: [f32; 2]) -> f32 {
 /// which the surface falls outwards.
 pub(super) fn near_falling(grid: &Grid<'_>, site: [i64; 2]) -> f32 {
     let mut square = 0.0_f32;
-    let mut range = [[f32::INFINITY, f32::NEG_INFINITY]; 2];
     let mut cells = [([0; 2], [[0.0_f32; 2]; 2]); 9];
     for (at, cell) in cells.iter_mut().enumerate() {
         let [x, y] = [at as i64 % 3 - 1, at as i64 / 3 - 1];
         let Sides { u, v } = Sides::new(grid.heights(grid.wrap([site[0] + x, site[1] + y])), grid.step);
         let ends = [u, v].map(|slopes| [slopes[0].min(slopes[1]), slopes[0].max(slopes[1])]);
-        for (range, ends) in range.iter_mut().zip(ends) {
-            *range = [range[0].min(ends[0]), range[1].max(ends[1])];
-        }
         *cell = ([x, y], ends);
         let along_u = match (x, y) {
             (0, 0) => u[0].abs().max(u[1].abs()),
@@ -83,9 +79,18 @@ pub(super) fn near_falling(grid: &Grid<'_>, site: [i64; 2]) -> f32 {
         let outward = |axis: usize, [least, most]: [f32; 2]| {
             if quadrant[axis] > 0 { [least, most] } else { [-most, -least] }
         };
-        let most = [outward(0, range[0])[1], outward(1, range[1])[1]];
         for (place, ends) in cells {
             if place[0] * quadrant[0] >= 0 && place[1] * quadrant[1] >= 0 {
+                // A straight way there leads through no cells but these.
+                let passed = cells
+                    .iter()
+                    .filter(|(at, _)| (0..2).all(|axis| at[axis] == 0 || at[axis] == place[axis]));
+                let mut most = [f32::NEG_INFINITY; 2];
+                for (_, ends) in passed {
+                    for (axis, most) in most.iter_mut().enumerate() {
+                        *most = most.max(outward(axis, ends[axis])[1]);
+                    }
+                }
                 let least = [outward(0, ends[0])[0], outward(1, ends[1])[0]];
                 falling = falling.max(ends_falling(most, least));
             }

@@ -1,8 +1,9 @@
-//! Branch and bound for neighbouring cells or texels side by side: all lanes walk one stack of nodes.
+//! Branch and bound for neighbouring cells side by side: all lanes walk one stack of nodes.
 
 use heightfield::lanes::Lanes;
 
 use super::super::grid::{Bounds, Grid, Node, Stack, Tile};
+use super::cells::{steepest, touches};
 
 /// What a distance may be too long by through rounding, UV units.
 const GAP_MARGIN: f32 = 1e-6;
@@ -11,36 +12,14 @@ const CAUTION: f32 = 1.0 - 3e-7;
 /// Most lanes.
 const MOST: usize = 16;
 
-/// No partner.
-pub(super) const NOBODY: [i32; 2] = [i32::MAX; 2];
-
-/// What rises start from.
-pub(super) trait Apex: Copy + Sync {
-    /// Its extent in cells: 1 for cells, 0 for texels, which are the upper left corners of the cells that name them.
-    const EXTENT: f32;
-    /// Whether points of the height of the lid count even where the surface does not fall behind them.
-    const LID: bool;
-
-    /// What is known beforehand of the one at this texel and site, and a slope above which nobody wants to know more.
-    fn start(self, texel: [i64; 2], site: [i64; 2]) -> [f32; 2];
-
-    /// Whether the cell at this offset is known beforehand.
-    fn touches(offset: [i64; 2]) -> bool;
-
-    /// The steepest rise from an apex with these corner heights to what counts of the cell at `offset` with its own, or
-    /// `known` if that is not less. `site`: of the apex.
-    fn steepest(self, site: [i64; 2], own: [f32; 4], offset: [i64; 2], heights: [f32; 4], known: f64) -> f64;
-}
-
-/// Cells or texels in a row and what is known of them.
-pub(super) struct Packet<'a, L: Lanes, A> {
+/// Cells in a row and what is known of them.
+pub(super) struct Packet<'a, L: Lanes> {
     grid: &'a Grid<'a>,
-    apex: A,
-    /// The first apex, as a site of the grid.
+    /// The first cell, as a site of the grid.
     first: [i64; 2],
-    /// Middles of the apexes across, from the first site; UV units.
+    /// Middles of the cells across, from the first site; UV units.
     u: L::F,
-    /// Half of each apex' extent.
+    /// Half of a cell's extent.
     half: [f32; 2],
     /// Heights `[h00, h10, h01, h11]`.
     heights: [L::F; 4],
@@ -51,21 +30,20 @@ pub(super) struct Packet<'a, L: Lanes, A> {
     /// The steepest rise known.
     pub slopes: [f32; MOST],
     /// The cell it leads to, as a site; may lie on another period.
-    pub partners: [[i32; 2]; MOST],
+    pub partners: [Option<[i32; 2]>; MOST],
 }
 
-impl<'a, L: Lanes, A: Apex> Packet<'a, L, A> {
-    /// Apexes from site `first` on. `slopes` are what they have to exceed; those that reach `enough` are done with.
+impl<'a, L: Lanes> Packet<'a, L> {
+    /// Cells from site `first` on. `slopes` are what they have to exceed; those that reach `enough` are done with.
     #[inline(always)]
     pub fn new(
         grid: &'a Grid<'a>,
-        apex: A,
         first: [i64; 2],
         heights: [&[f32]; 4],
         slopes: &[f32],
         enough: &[f32],
     ) -> Self {
-        let half = grid.step.map(|step| 0.5 * A::EXTENT * step);
+        let half = grid.step.map(|step| 0.5 * step);
         let mut u = [0.0; MOST];
         for (k, u) in u.iter_mut().enumerate() {
             *u = k as f32 * grid.step[0] + half[0];
@@ -74,7 +52,6 @@ impl<'a, L: Lanes, A: Apex> Packet<'a, L, A> {
         let [h00, h10, h01, h11] = heights;
         let mut packet = Self {
             grid,
-            apex,
             first,
             u: L::load(&u),
             half,
@@ -83,7 +60,7 @@ impl<'a, L: Lanes, A: Apex> Packet<'a, L, A> {
             lowest: L::min(L::min(h00, h10), L::min(h01, h11)),
             enough: [0.0; MOST],
             slopes: [0.0; MOST],
-            partners: [NOBODY; MOST],
+            partners: [None; MOST],
         };
         packet.slopes[..L::WIDTH].copy_from_slice(&slopes[..L::WIDTH]);
         packet.enough[..L::WIDTH].copy_from_slice(&enough[..L::WIDTH]);
@@ -150,7 +127,7 @@ impl<'a, L: Lanes, A: Apex> Packet<'a, L, A> {
         let rise = L::splat(node.max) - self.lowest;
         let near = L::lt(zero, rise)
             & L::le(slope * slope * gap, rise * rise)
-            & (self.may_fall(tile.gradient, [vx, L::splat(vy)], wide) | lid::<L, A>(tile.max));
+            & self.may_fall(tile.gradient, [vx, L::splat(vy)], wide);
         if !L::any(near) {
             return near;
         }
@@ -197,9 +174,7 @@ impl<'a, L: Lanes, A: Apex> Packet<'a, L, A> {
             for i in first[0]..=last[0] {
                 let heights = self.grid.heights([i as usize, j as usize]);
                 let vx = L::splat((i + origin[0] - self.first[0]) as f32 * du + half[0]) - self.u;
-                let highest = heights[0].max(heights[1]).max(heights[2].max(heights[3]));
-                let falls =
-                    self.may_fall(gradients(heights, self.grid.step), [vx, vy], wide) | lid::<L, A>(highest);
+                let falls = self.may_fall(gradients(heights, self.grid.step), [vx, vy], wide);
                 if !L::any(falls) {
                     continue;
                 }
@@ -236,26 +211,19 @@ impl<'a, L: Lanes, A: Apex> Packet<'a, L, A> {
     /// Tries one cell for one lane; tells whether it was steeper.
     fn improve(&mut self, lane: usize, site: [i64; 2], heights: [f32; 4]) -> bool {
         let offset = self.offset(lane, site);
-        if A::touches(offset) || self.slopes[lane] >= self.enough[lane] {
+        if touches(offset) || self.slopes[lane] >= self.enough[lane] {
             return false;
         }
         let own = self.corners.each_ref().map(|corner| corner[lane]);
         let known = f64::from(self.slopes[lane]);
-        let place = [self.first[0] + lane as i64, self.first[1]];
-        let found = self.apex.steepest(place, own, offset, heights, known);
+        let found = steepest(self.grid, own, offset, heights, known);
         if found > known {
             let rounded = found as f32;
             self.slopes[lane] = if f64::from(rounded) < found { rounded.next_up() } else { rounded };
-            self.partners[lane] = site.map(|at| at as i32);
+            self.partners[lane] = Some(site.map(|at| at as i32));
         }
         found > known
     }
-}
-
-/// All lanes if something as high as this counts anyway.
-#[inline(always)]
-fn lid<L: Lanes, A: Apex>(height: f32) -> L::M {
-    L::first(if A::LID && height >= 1.0 { L::WIDTH } else { 0 })
 }
 
 /// The least product of a number between two and one at most `wide` away from `middle`.

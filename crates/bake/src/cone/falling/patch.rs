@@ -123,7 +123,7 @@ fn attained(a: &Patch, b: &Patch) -> f64 {
 ///
 /// For any vector `p` not longer than `slope`, `slope |y - x| >= p . (y - x)`. With that in its place,
 /// `h(y) - h(x) - p . (y - x)` is bilinear in `x` and in `y`, so its maximum lies at corners: where it is not
-/// above zero at any pair of corners, no pair of points rises that much. Three such vectors are tried: one that
+/// above zero at any pair of corners, no pair of points rises that much. Vectors tried are: one that
 /// is the mean gradient across the way from `a` to `b`, which takes the common tilt of the surface away, and as long as
 /// it may be along it; one that leads along the way; and one between them.
 fn may_rise(a: &Patch, b: &Patch, slope: f64) -> bool {
@@ -137,6 +137,7 @@ fn may_rise(a: &Patch, b: &Patch, slope: f64) -> bool {
     let along = tilt[0] * way[0] + tilt[1] * way[1];
     let square = tilt[0] * tilt[0] + tilt[1] * tilt[1];
     let spare = slope * slope + along * along - square;
+    let slopes_of_b = b.slopes();
     let (a, b) = (a.heights, b.heights);
     let rises = |p: [f64; 2]| {
         let (x, y) = (p[0] * half[0][0], p[1] * half[0][1]);
@@ -157,6 +158,13 @@ fn may_rise(a: &Patch, b: &Patch, slope: f64) -> bool {
         if length > 0.0 && !rises([middle[0] * slope / length, middle[1] * slope / length]) {
             return false;
         }
+    }
+    // Only where the surface falls at `y` does the rise count, and there what its gradient says of the way may be taken
+    // off: less than nothing, but for what the gradient may differ by within `b`.
+    let [u, v] = slopes_of_b;
+    let straight = slope - 0.5 * (u[1] - u[0]).hypot(v[1] - v[0]);
+    if straight > 0.0 && !rises([of_b[0] + straight * way[0], of_b[1] + straight * way[1]]) {
+        return false;
     }
     rises([slope * way[0], slope * way[1]])
 }
