@@ -211,6 +211,8 @@ def test_misses_keep_a_setting_off_the_front(result: bw.CompareResult) -> None:
             # On the front, where ties go both ways, or off it by the tie alone.
             assert all(row["label"] in tied for tied in back)
             assert other in {measured["label"] for measured in result.select()}
+        assert set(row["rivals"]) <= set(row["tied_with"])
+        assert row["certain"] == (not row["rivals"])
 
 
 @pytest.mark.parametrize(

@@ -178,10 +178,10 @@ class CompareResult:
         -------
         list of dict
             Rows by rising time, each with ``tied_with``: labels of settings whose time cannot be told from
-            its own (the quartile ranges meet, or the medians are within 25 %) and that are on the front
-            too or would be, were the tie broken in their favour; and ``certain``: whether it is on the front
-            however ties are broken. On another machine one that is not certain may make way for one that it
-            ties with.
+            its own (quartiles meet, or medians or lower quartiles are within 25 %) and that are on the front
+            too or would be, were the tie broken in their favour; ``rivals``: those of them that are no less
+            accurate, so that they may take its place on another machine (one of it and its rivals is on the
+            front however ties are broken); and ``certain``: whether it has no rival.
 
         Raises
         ------
@@ -191,9 +191,13 @@ class CompareResult:
         rows, measured = self._measured(elevation, time)
         allowed = number("max_failure_rate", max_failure_rate, 0.0, 1.0)
         front = _bumpwgpu.compare_front(measured, allowed)
+
+        def labels(some: list[int]) -> list[str]:
+            return [rows[at]["label"] for at in some]
+
         return [
-            {**rows[at], "tied_with": [rows[other]["label"] for other in tied], "certain": certain}
-            for at, tied, certain in front
+            {**rows[at], "tied_with": labels(tied), "rivals": labels(rivals), "certain": not rivals}
+            for at, tied, rivals in front
         ]
 
     def recommend(
@@ -381,6 +385,7 @@ class CompareResult:
             "pareto": [row["label"] for row in front],
             "certain": [row["label"] for row in front if row["certain"]],
             "ties": {row["label"]: row["tied_with"] for row in front if row["tied_with"]},
+            "rivals": {row["label"]: row["rivals"] for row in front if row["rivals"]},
             "recommendation": advice_dict(advice),
         }
         text = json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False)

@@ -28,6 +28,10 @@ impl Candidate {
     }
 }
 
+fn is_fit(candidate: &Candidate) -> bool {
+    candidate.eligible && candidate.error.is_finite()
+}
+
 fn no_less_accurate(a: &Candidate, b: &Candidate) -> bool {
     a.ranked_error() <= b.ranked_error()
 }
@@ -52,9 +56,7 @@ fn outclasses(a: &Candidate, b: &Candidate) -> bool {
 
 /// Indices of those that are on the front or would be, were ties in time broken in their favour.
 pub fn contenders(candidates: &[Candidate]) -> Vec<usize> {
-    let fit: Vec<usize> = (0..candidates.len())
-        .filter(|&i| candidates[i].eligible && candidates[i].error.is_finite())
-        .collect();
+    let fit: Vec<usize> = (0..candidates.len()).filter(|&i| is_fit(&candidates[i])).collect();
     let beaten = |i: usize| fit.iter().any(|&j| j != i && outclasses(&candidates[j], &candidates[i]));
     fit.iter().copied().filter(|&i| !beaten(i)).collect()
 }
@@ -84,20 +86,19 @@ pub fn front(candidates: &[Candidate]) -> Vec<usize> {
     front
 }
 
-/// Whether candidate `i` is on the front however ties in time are broken: whatever is no less accurate takes
-/// clearly longer, or was timed as one with it and is beaten by it already.
-pub fn is_certain(candidates: &[Candidate], i: usize) -> bool {
+/// Those of the contenders that may take the place of contender `i` where ties in time are broken otherwise: no
+/// less accurate, not clearly slower, and not timed as one with it.
+///
+/// One of `i` and its rivals is on the front however ties are broken: of all that are no less accurate than `i`,
+/// the one that is truly fastest is kept out by nothing, and whoever is clearly slower than `i` is not that one.
+pub fn rivals(candidates: &[Candidate], i: usize, contenders: &[usize]) -> Vec<usize> {
     let own = &candidates[i];
-    let fit = |other: &Candidate| other.eligible && other.error.is_finite();
-    let rivals = |other: &Candidate| {
+    let rival = |&j: &usize| {
+        let other = &candidates[j];
         let as_accurate = other.ranked_error() <= own.ranked_error() * (1.0 + ERROR_SLACK);
         as_accurate && other.time != own.time && !own.time.clearly_faster(&other.time)
     };
-    fit(own)
-        && candidates
-            .iter()
-            .enumerate()
-            .all(|(j, other)| j == i || !fit(other) || !rivals(other) && !outclasses(other, own))
+    contenders.iter().copied().filter(|&j| j != i).filter(rival).collect()
 }
 
 /// Those of `others` whose time cannot be told from that of candidate `i`.
@@ -182,17 +183,19 @@ mod tests {
             // Each contender that is off the front ties with a member of it.
             let tied = |i: &usize| front.contains(i) || !ties(&all, *i, &front).is_empty();
             assert!(near.iter().all(tied));
-            // Who ties with nobody is certain, and who is certain is on the front.
-            let alone = |i: &&usize| ties(&all, **i, &near).is_empty();
-            assert!(front.iter().filter(alone).all(|&i| is_certain(&all, i)));
-            assert!((0..all.len()).all(|i| !is_certain(&all, i) || front.contains(&i)));
+            // The rivals of a contender tie with it, and a contender without any is on the front.
+            for &i in &near {
+                let rivals = rivals(&all, i, &near);
+                assert_eq!(ties(&all, i, &rivals), rivals);
+                assert!(!rivals.is_empty() || front.contains(&i));
+            }
         }
     }
 
     #[test]
-    fn who_is_certain_is_never_beaten_while_times_stay_within_the_tie() {
+    fn one_of_a_contender_and_its_rivals_is_never_beaten_while_times_stay_within_the_tie() {
         let mut random = crate::rays::Random::new(9, 10);
-        let mut counted = 0;
+        let (mut certain, mut alone_beaten, mut one_missing) = (0, 0, 0);
         for _ in 0..500 {
             let mut run = |all: &[Candidate], most: f64| -> Vec<Candidate> {
                 let moved = |one: &Candidate| {
@@ -211,12 +214,24 @@ mod tests {
             let here = run(&even, 6.0);
             // Each quotient of two times moves by a tie's breadth at most.
             let there = run(&here, LEAST_LEAD);
-            for i in (0..here.len()).filter(|&i| is_certain(&here, i)) {
-                counted += 1;
-                assert!(contenders(&there).contains(&i));
+            // Beaten by medians alone, where a tie is no excuse.
+            let beaten = |i: &usize| {
+                let faster = |by: &Candidate| by.time.median_ns < there[*i].time.median_ns;
+                there.iter().any(|by| faster(by) && no_less_accurate(by, &there[*i]))
+            };
+            let near = contenders(&here);
+            for &i in &near {
+                let rivals = rivals(&here, i, &near);
+                certain += usize::from(rivals.is_empty());
+                alone_beaten += usize::from(beaten(&i));
+                assert!(!beaten(&i) || !rivals.iter().all(beaten));
+                let but_first = rivals.get(1..).unwrap_or_default();
+                one_missing += usize::from(beaten(&i) && but_first.iter().all(beaten));
             }
         }
-        assert!(counted > 500, "{counted}");
+        assert!(certain > 500, "{certain}");
+        assert!(alone_beaten > 100, "rivals count for something: {alone_beaten}");
+        assert!(one_missing > 50, "and none of them too many: {one_missing}");
     }
 
     #[test]

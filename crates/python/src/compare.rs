@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use compare::pareto::{Candidate, contenders, front, is_certain, ties};
+use compare::pareto::{Candidate, contenders, front, rivals, ties};
 use compare::picture::View;
 use compare::recommend::{Budget, Entry, recommend};
 use compare::{
@@ -361,11 +361,11 @@ fn timing([low_ns, median_ns, high_ns]: [f64; 3]) -> Timing {
 }
 
 /// Indices of the settings on the Pareto front, by rising time, each with those whose time cannot be told from
-/// its own and that are on the front too or would be, were the tie broken in their favour; and whether it is on
-/// the front however ties are broken. Settings that fail on more than `max_failure_rate` of the rays cannot be
+/// its own and that are on the front too or would be, were the tie broken in their favour; and those of these that
+/// may take its place. Settings that fail on more than `max_failure_rate` of the rays cannot be
 /// on it.
 #[pyfunction]
-pub fn compare_front(measured: Vec<Measured>, max_failure_rate: f64) -> Vec<(usize, Vec<usize>, bool)> {
+pub fn compare_front(measured: Vec<Measured>, max_failure_rate: f64) -> Vec<(usize, Vec<usize>, Vec<usize>)> {
     let candidates: Vec<Candidate> = measured
         .into_iter()
         .map(|(_, time, error, failure_rate, memory)| Candidate {
@@ -377,7 +377,7 @@ pub fn compare_front(measured: Vec<Measured>, max_failure_rate: f64) -> Vec<(usi
         .collect();
     let kept = front(&candidates);
     let near = contenders(&candidates);
-    kept.iter().map(|&i| (i, ties(&candidates, i, &near), is_certain(&candidates, i))).collect()
+    kept.iter().map(|&i| (i, ties(&candidates, i, &near), rivals(&candidates, i, &near))).collect()
 }
 
 /// Index of the cheapest setting within the budget, if any, and why. The budget: p99 error in texels, share
