@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ._map_info import MAPS
 from ._stress_cases import WRAPS
+from ._stress_mips import MIP_MAPS, mip_checks
 from ._stress_rows import Check, failed, row
 from ._stress_sky import SKY_MAPS, sky_checks, sky_texels
 from ._stress_surface import folded, padded, surface
@@ -78,6 +79,10 @@ def _of_one(bake: Bake, name: str, source: HeightMap, made: list[NDArray[np.floa
         yield from _pyramid(source, made)
     if name == "distance":
         yield _distances(source, made[0])
+    if name == "curvature":
+        yield _curvatures(source, made[0])
+    if name in MIP_MAPS:
+        yield from mip_checks(name, made, _true_normals(source, *_TAPS["sobel3"]), _lost(source))
     limit = 0.0
     if name in SKY_MAPS and source.scale == 0.1:
         normals = _true_normals(source, *_TAPS["sobel3"])
@@ -125,11 +130,15 @@ def _normals(bake: Bake, name: str, source: HeightMap) -> Iterator[Check]:
             angle = np.where(
                 truth[..., 2] > 0.02, angle, np.degrees(np.linalg.norm((ours - truth)[..., :2], axis=-1))
             )
-        # Eight roundings of sums below 2 to 32 bits, as an angle: what steep reliefs make of them.
-        rows, columns = source.shape
-        steepest = source.scale * max(columns / source.tile_size[0], rows / source.tile_size[1])
-        rounding = np.degrees(8.0 * _EPSILON * steepest * truth[..., 2] ** 2)
+        rounding = np.degrees(_lost(source) * truth[..., 2] ** 2)
         yield _check(f"formula, {kernel}", [np.maximum(angle - rounding, 0.0)], "degrees", limit)
+
+
+def _lost(source: HeightMap) -> float:
+    """Slope that eight roundings of sums below 2 to 32 bits amount to: what steep reliefs make of them."""
+    rows, columns = source.shape
+    steepest = source.scale * max(columns / source.tile_size[0], rows / source.tile_size[1])
+    return 8.0 * _EPSILON * float(steepest)
 
 
 def _true_normals(source: HeightMap, smoothing: tuple[int, int, int], total: float) -> Heights:
@@ -147,6 +156,41 @@ def _true_normals(source: HeightMap, smoothing: tuple[int, int, int], total: flo
     normals = np.stack(np.broadcast_arrays(x, y, 1.0), axis=-1)
     unit: Heights = normals / np.linalg.norm(normals, axis=-1, keepdims=True)
     return unit
+
+
+def _curvatures(source: HeightMap, made: NDArray[np.float64]) -> Check:
+    """Against the shape operator of the quadric through each texel and its neighbours.
+
+    In roundings to 32 bits of the curvatures, and to 64 of what they are the difference of.
+    """
+    heights = padded(source) * np.float64(np.float32(source.scale))
+    rows, columns = source.shape
+    near = {
+        (i, j): heights[1 + j : 1 + j + rows, 1 + i : 1 + i + columns] for i in (-1, 0, 1) for j in (-1, 0, 1)
+    }
+    wide, tall = (side / texels for side, texels in zip(source.tile_size, (columns, rows), strict=True))
+    p, q = (near[1, 0] - near[-1, 0]) / (2 * wide), (near[0, 1] - near[0, -1]) / (2 * tall)
+    xx = (near[1, 0] - 2 * near[0, 0] + near[-1, 0]) / wide**2
+    yy = (near[0, 1] - 2 * near[0, 0] + near[0, -1]) / tall**2
+    xy = (near[1, 1] - near[-1, 1] - near[1, -1] + near[-1, -1]) / (4 * wide * tall)
+    # I^-1 II of the first and second fundamental forms; bumps count as positive.
+    area = 1 + p**2 + q**2
+    first = np.stack([np.stack([1 + q**2, -p * q], -1), np.stack([-p * q, 1 + p**2], -1)], -1)
+    second = -np.stack([np.stack([xx, xy], -1), np.stack([xy, yy], -1)], -1)
+    shape = first @ second / area[..., None, None] ** 1.5
+    truth = np.stack([np.trace(shape, axis1=-2, axis2=-1) / 2, (xx * yy - xy**2) / area**2], -1)
+    largest = [
+        (np.abs(first) @ np.abs(second)).sum((-2, -1)) / area**1.5,
+        (np.abs(xx * yy) + xy**2) / area**2,
+    ]
+    # Sums of three heights cancel down to roundings of the heights, which were divided by texels squared.
+    noise = 16 * np.finfo(np.float64).eps * np.abs(heights).max() / min(wide, tall) ** 2
+    sides = (1 + p**2 + 1 + q**2) / area**1.5
+    lost = [noise * sides, noise * (np.abs(xx) + np.abs(yy) + 2 * np.abs(xy) + noise) / area**2]
+    allowed = 2 * _EPSILON * np.abs(truth) + 1e-14 * np.stack(largest, -1) + np.stack(lost, -1)
+    # The least number of 32 bits.
+    allowed += 2.0**-149
+    return _check("formula", [np.abs(made - truth) / allowed], "roundings", 1.0)
 
 
 def cones(name: str, source: HeightMap, ratios: NDArray[np.float64]) -> Check:

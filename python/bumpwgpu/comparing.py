@@ -88,8 +88,9 @@ def compare(
     of the relief above the surface and more than a texel short of the true one. Either is no answer at
     all, so a setting with more than 0.1 % of them is neither on the front nor recommended.
 
-    Times whose quartiles meet, or whose medians or lower quartiles differ by less than 25 %, are a tie. Which settings the
-    sweep tries depends on errors and texture reads, not on time, so it tries the same ones on every machine.
+    Times whose quartiles meet, or whose medians or lower quartiles differ by less than 25 %, are a tie.
+    Which settings the sweep tries depends on errors and texture reads, not on time, so it tries the same
+    ones on every machine.
 
     Examples
     --------
