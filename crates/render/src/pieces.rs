@@ -168,9 +168,9 @@ mod tests {
     #[test]
     fn opposite_normals_and_many_triangles_come_to_an_end() {
         let count = 20_000;
-        let positions = vec![[0.0_f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].repeat(count);
-        let normals = vec![[0.0_f32, 0.0, 1.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]].repeat(count);
-        let uvs = vec![[0.0_f32, 0.0], [1.0, 0.0], [0.0, 1.0]].repeat(count);
+        let positions = [[0.0_f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].repeat(count);
+        let normals = [[0.0_f32, 0.0, 1.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]].repeat(count);
+        let uvs = [[0.0_f32, 0.0], [1.0, 0.0], [0.0, 1.0]].repeat(count);
         let indices: Vec<[u32; 3]> = (0..count as u32).map(|at| [0, 1, 2].map(|k| 3 * at + k)).collect();
         let mesh = Mesh::from_arrays(&positions, &indices, &uvs, Some(&normals), None).unwrap();
         let arrays = MeshArrays::new(&mesh, DVec3::ZERO);
