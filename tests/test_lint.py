@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -297,3 +298,80 @@ def test_real_materials_are_told_apart(assets: Path) -> None:
     ):
         found = set(codes(bw.lint(assets / folder)))
         assert found & {"inverted-heights", "wrong-green", "height-mismatch"} == expected, folder
+
+
+# Textures of engines
+
+
+def _packed(normals: np.ndarray, heights: np.ndarray) -> Image.Image:
+    """Normals with heights in alpha."""
+    vectors = np.rint((normals * 0.5 + 0.5) * 255)
+    return Image.fromarray(np.dstack([vectors, np.rint(heights * 255)]).astype(np.uint8), "RGBA")
+
+
+@pytest.mark.parametrize("suffix", ["png", "tga", "dds"])
+def test_heights_in_alpha(wall: bw.HeightMap, normals: np.ndarray, tmp_path: Path, suffix: str) -> None:
+    texture = _packed(normals, wall.array)
+    texture.save(tmp_path / f"wall_nh.{suffix}")
+    report = bw.lint(tmp_path)
+    assert codes(report) == ["8-bit-heights"], str(report)
+    assert {part.rsplit("(", 1)[1] for part in report.checked} == {"normal)", "alpha height)"}
+    assert "wrong-green" in codes(bw.lint(tmp_path, convention="directx"))
+    # Heights of another surface, upside down, and none at all.
+    _packed(normals, bw.HeightMap.procedural("fbm", 64, seed=9).array).save(tmp_path / f"wall_nh.{suffix}")
+    assert "height-mismatch" in codes(bw.lint(tmp_path))
+    _packed(normals, 1.0 - wall.array).save(tmp_path / f"wall_nh.{suffix}")
+    assert "inverted-heights" in codes(bw.lint(tmp_path))
+    assert "inverted-heights" not in codes(bw.lint(tmp_path, invert=True))
+    texture.convert("RGB").save(tmp_path / f"wall_nh.{suffix}")
+    assert "unreadable" in codes(bw.lint(tmp_path))
+
+
+def test_an_alpha_channel_that_nobody_expects(
+    wall: bw.HeightMap, normals: np.ndarray, tmp_path: Path
+) -> None:
+    _packed(normals, wall.array).save(tmp_path / "wall_normal.png")
+    assert "data-in-alpha" in codes(bw.lint(tmp_path))
+    _packed(normals, np.ones_like(wall.array)).save(tmp_path / "wall_normal.png")
+    assert "data-in-alpha" not in codes(bw.lint(tmp_path))
+
+
+def test_textures_in_blocks(normals: np.ndarray, tmp_path: Path) -> None:
+    texture = _packed(normals, np.ones(normals.shape[:2])).convert("RGB")
+    path = tmp_path / "wall_normal.dds"
+    try:
+        texture.save(path, pixel_format="BC5")
+    except OSError:
+        pytest.skip("this Pillow writes no blocks")
+    if path.stat().st_size > 3 * 64 * 64:
+        pytest.skip("this Pillow writes no blocks")
+    assert not {"lossy", "non-unit", "unreadable"} & {*codes(bw.lint(path))}
+    texture.convert("RGBA").save(path, pixel_format="DXT1")
+    assert "lossy" in codes(bw.lint(path))
+
+
+def test_tagged_and_hostile_textures(normals: np.ndarray, tmp_path: Path) -> None:
+    path = tmp_path / "wall_normal.dds"
+    _packed(normals, np.ones(normals.shape[:2])).save(path)
+    plain = path.read_bytes()
+    # 28 and 29 are DXGI's R8G8B8A8, linear and sRGB; Pillow alone does not know 72, BC1 in sRGB.
+    for kind, tagged in ((28, False), (29, True), (71, False), (72, True)):
+        newer = struct.pack("<5I", kind, 3, 0, 1, 0)
+        path.write_bytes(plain[:80] + struct.pack("<I4s", 4, b"DX10") + plain[88:128] + newer + plain[128:])
+        assert ("srgb-tagged" in codes(bw.lint(path))) == tagged, kind
+    larger = plain[:12] + struct.pack("<2I", 60_000, 60_000) + plain[20:]
+    for broken in (b"", plain[:60], plain[: len(plain) // 2], b"DDX " + plain[4:], larger):
+        path.write_bytes(broken)
+        assert codes(bw.lint(path)) == ["unreadable"]
+        with pytest.raises(bw.BumpError):
+            bw.HeightMap(path, channel="r")
+
+
+def test_a_texture_of_a_terrain(assets: Path) -> None:
+    path = assets / "ogre" / "Bricks076C_normheight.dds"
+    if not path.exists():
+        pytest.skip(f"no {path}")
+    report = bw.lint(path)
+    assert codes(report) == ["8-bit-heights", "lossy", "non-unit"], str(report)
+    assert "wrong-green" in codes(bw.lint(path, convention="directx"))
+    assert "inverted-heights" in codes(bw.lint(path, invert=True))

@@ -91,6 +91,11 @@ def read_any(source: Any, label: str) -> Pixels:
             )
         if "\0" in str(path):
             raise ValueError(f"{label}: path contains a null character")
+        if path.suffix.lower() == ".dds":
+            from ._dds import read_dds
+
+            texels, notes = read_dds(path)
+            return Pixels(texels, [f"{path.name} {note}" for note in notes], path.name)
         values, names, texts = _bumpwgpu.read_image(path)
         return Pixels(values, [f"{path.name}: {text}" for text in texts], path.name, names)
     if is_pil_image(source):

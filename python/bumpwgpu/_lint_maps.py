@@ -14,7 +14,7 @@ from .errors import BumpError, BumpWarning
 from .heightmap import HeightMap, Wrap
 from .repair import NormalReport, check_normals, tile_report
 
-__all__ = ["cone_findings", "height_findings", "normal_findings"]
+__all__ = ["alpha_heights", "cone_findings", "height_findings", "normal_findings"]
 
 Found = tuple[str, str, str, str]
 
@@ -86,8 +86,29 @@ def height_findings(
     return found, heights
 
 
+def alpha_heights(source: Any) -> NDArray[Any]:
+    """The plane of heights that a normal map has beside its vectors.
+
+    Raises
+    ------
+    ValueError
+        There is none.
+    """
+    values = read_any(source, "normals").values
+    if values.ndim != 3 or values.shape[2] != 4:
+        raise ValueError(
+            "its name says that heights stand in the alpha channel, but there is none; export it with alpha"
+        )
+    return np.ascontiguousarray(values[..., 3])
+
+
 def normal_findings(
-    source: Any, partner: HeightMap | None, convention: str, wrap: Wrap, scale: float | None
+    source: Any,
+    partner: HeightMap | None,
+    convention: str,
+    wrap: Wrap,
+    scale: float | None,
+    alpha_is_heights: bool = False,
 ) -> list[Found]:
     """Looks at a normal map, by itself and beside its heights."""
     found = []
@@ -98,6 +119,9 @@ def normal_findings(
     except (BumpError, ValueError, TypeError, OSError) as error:
         return [*found, _unreadable(error)]
     found += _vectors(report, pixels.values.shape[-1])
+    if not alpha_is_heights and pixels.values.shape[-1] == 4 and np.ptp(pixels.values[..., 3]) > 0:
+        fix = "Name the file _nh when these are heights, and they are looked at too."
+        found.append(("data-in-alpha", "info", "something is stored in the alpha channel", fix))
     if partner is not None and partner.shape != pixels.values.shape[:2]:
         sizes = " x ".join(map(str, pixels.values.shape[1::-1]))
         rows, columns = partner.shape
@@ -267,6 +291,9 @@ def _tags(texts: list[str]) -> list[Found]:
         if "sRGB" in text or "gamma" in text:
             fix = "Save it without a colour profile, and import it as linear data."
             found.append(("srgb-tagged", "error", text, fix))
+        elif "in blocks" in text:
+            fix = "Keep normals in BC5 or BC7, and heights in BC4 or 16 bits."
+            found.append(("lossy", "warning", text, fix))
         elif "JPEG" in text:
             fix = "Export PNG, TIFF or EXR."
             found.append(("lossy", "warning", text, fix))

@@ -13,8 +13,9 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 
 from ._atomic import replace_file
 from ._checks import choice, number
-from ._lint_maps import cone_findings, height_findings, normal_findings
+from ._lint_maps import alpha_heights, cone_findings, height_findings, normal_findings
 from ._lint_mesh import inside_one_tile, mesh_findings
+from .errors import BumpError
 from .heightmap import HeightMap, Wrap, checked_extent
 from .meshes import Mesh
 
@@ -41,6 +42,7 @@ CODES: dict[str, str] = {
     "height-mismatch": "normals and heights are of different surfaces",
     "inverted-heights": "the heights are depths: bumps go in",
     "scale-mismatch": "normals were made for another depth of the relief",
+    "data-in-alpha": "an alpha channel that nobody expects is dropped, or its data lost in compression",
     "size-mismatch": "maps that belong together differ in size",
     "non-conservative-cone": "cones cut the surface: searches by them jump over features",
     "no-uvs": "there are no texture coordinates",
@@ -52,7 +54,7 @@ CODES: dict[str, str] = {
     "tangent-space": "stored tangents are far from MikkTSpace, for which normals are baked",
 }
 
-_IMAGES = (".png", ".tif", ".tiff", ".exr", ".jpg", ".jpeg", ".webp", ".bmp", ".tga", ".npy")
+_IMAGES = (".png", ".tif", ".tiff", ".exr", ".jpg", ".jpeg", ".webp", ".bmp", ".tga", ".dds", ".npy")
 _MESHES = (".obj", ".gltf", ".glb")
 _OTHER = frozenset(
     (
@@ -61,8 +63,13 @@ _OTHER = frozenset(
         *("emissive", "orm", "arm", "occlusionroughmetal"),
     )
 )
+#: Normals with heights in the alpha channel.
+_WITH_HEIGHTS = frozenset({"nh", "normalheight", "normheight", "normaldisp", "normaldisplacement"})
 _ROLES: tuple[tuple[str, frozenset[str]], ...] = (
-    ("normal", frozenset({"normal", "normals", "nrm", "nor", "norm", "normalgl", "normaldx", "ddn"})),
+    (
+        "normal",
+        frozenset({"normal", "normals", "nrm", "nor", "norm", "normalgl", "normaldx", "ddn", *_WITH_HEIGHTS}),
+    ),
     ("relaxed_cone", frozenset({"relaxedcone"})),
     ("cone", frozenset({"cone", "cones"})),
     (
@@ -204,7 +211,8 @@ def lint(
     ----------
     *sources : path
         Files and folders. What a file holds is read off its name, such as ``rock_normal.png`` and
-        ``rock_height.png``; files whose names differ in that alone are checked against each other.
+        ``rock_height.png``, or ``rock_nh.dds`` for normals with heights in alpha; files whose names
+        differ in that alone are checked against each other.
     height, normal, cone, relaxed_cone : path, array, PIL image or None
         Maps that belong together, whatever their names.
     mesh : Mesh, path or None
@@ -250,6 +258,8 @@ def lint(
     parts = [part for source in sources for part in _found(source)]
     named = {"height": height, "normal": normal, "cone": cone, "relaxed_cone": relaxed_cone, "mesh": mesh}
     parts += [_given(role, source) for role, source in named.items() if source is not None]
+    in_alpha = [part for part in parts if part.role == "normal" and part.words & _WITH_HEIGHTS]
+    parts += [part._replace(role="alpha height", subject=f"{part.subject}, alpha") for part in in_alpha]
     if not parts:
         raise ValueError("nothing to check: give files, folders, or height=, normal=, cone=, mesh=")
     settings = {"convention": convention, "wrap": wrap, "scale": depth, "tile_size": tile, "invert": invert}
@@ -258,7 +268,7 @@ def lint(
     # Maps beside a mesh whose UVs stay inside one tile need not tile.
     charts = {part.family[0] for part in parts if part.role == "mesh" and inside_one_tile(part.source)}
     # Heights first: the other maps are held against them.
-    for part in sorted(parts, key=lambda part: part.role != "height"):
+    for part in sorted(parts, key=lambda part: part.role not in ("height", "alpha height")):
         for code, severity, message, fix in _check(part, settings, heights):
             if code == "tile-seam" and severity == "error" and part.family[0] in charts:
                 severity, message = "warning", f"{message}; the mesh beside it stays inside one tile"
@@ -276,9 +286,15 @@ def _check(part: _Part, settings: dict[str, Any], heights: dict[tuple[str, str],
     if part.role == "other":
         return []
     wrap, tile = settings["wrap"], settings["tile_size"]
-    if part.role == "height":
+    if part.role in ("height", "alpha height"):
+        source = part.source
+        if part.role != "height":
+            try:
+                source = alpha_heights(source)
+            except (BumpError, ValueError, TypeError, OSError) as error:
+                return [("unreadable", "error", str(error).splitlines()[0], "Export the file again.")]
         inverted = "depth" in part.words if settings["invert"] is None else settings["invert"]
-        found, checked = height_findings(part.source, wrap, tile, inverted)
+        found, checked = height_findings(source, wrap, tile, inverted)
         if checked is not None:
             heights[part.family] = checked
         return found
@@ -286,7 +302,8 @@ def _check(part: _Part, settings: dict[str, Any], heights: dict[tuple[str, str],
     if part.role == "normal":
         says = {"opengl": {"gl", "opengl", "normalgl"}, "directx": {"dx", "directx", "normaldx"}}
         wanted = next((name for name, words in says.items() if words & part.words), settings["convention"])
-        return normal_findings(part.source, partner, wanted, wrap, settings["scale"])
+        in_alpha = bool(part.words & _WITH_HEIGHTS)
+        return normal_findings(part.source, partner, wanted, wrap, settings["scale"], in_alpha)
     return cone_findings(part.source, part.role, partner)
 
 
