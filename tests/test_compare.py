@@ -602,6 +602,38 @@ def test_a_camera_path_counts_all_of_its_pixels(scene: bw.Scene) -> None:
 
 
 @pytest.mark.gpu
+def test_several_instances_count_together(scene: bw.Scene) -> None:
+    def placed(x: float, y: float, size: float) -> bw.Instance:
+        # Turned about z, mirrored, and stretched unevenly.
+        world = np.array([[0.0, -size, 0.0, x], [-0.7 * size, 0.0, 0.0, y], [0, 0, 0.8, 0], [0, 0, 0, 1.0]])
+        return bw.Instance(bw.Mesh.quad() if x < 0.0 else bw.Mesh.cube(), scene.material, world)
+
+    both = [placed(-0.6, 0.1, 0.7), placed(0.5, 0.0, 0.5)]
+    cameras = [bw.Camera.look_at((x, -1.6, 1.1), (0.0, 0.0, 0.0), fov_y=45.0) for x in (-0.4, 0.7)]
+
+    def compared(*instances: bw.Instance) -> bw.CompareResult:
+        path = bw.Scene(instances, None, cameras, scene.lights, (96, 72))
+        return bw.compare(path, ["flat", "relief", "exact"], elevations=(60, 30, 15), repeats=1)
+
+    together, alone = compared(*both), [compared(one) for one in both]
+    exact, relief, flat = (row_of(together, name) for name in ("exact", "relief", "flat"))
+    assert exact["uv_error_p99_texels"] < 0.02
+    assert exact["miss_rate"] == 0.0
+    assert exact["uv_error_p99_texels"] < relief["uv_error_p99_texels"] < flat["uv_error_p99_texels"]
+    # Neither hides the other here.
+    rays = [row_of(made, "exact")["rays"] for made in alone]
+    assert min(rays) > 200
+    assert exact["rays"] == sum(rays)
+    assert flat["uv_error_max_texels"] == max(row_of(made, "flat")["uv_error_max_texels"] for made in alone)
+    for row in together.rows:
+        assert row["regions"].keys() <= {"interior", "silhouette", "shadow"}
+        assert sum(part["rays"] for part in row["regions"].values()) == row["rays"]
+    assert exact["regions"].keys() == {"interior", "silhouette", "shadow"}
+    assert len(together.environment["mesh"]) == 2
+    assert together.recommend(0.5).verified_rays > exact["rays"]
+
+
+@pytest.mark.gpu
 def test_a_scene_makes_a_report_too(scene_result: bw.CompareResult, tmp_path: Path) -> None:
     text = scene_result.report(tmp_path / "scene.html").read_text()
     assert "FLIP" in text or "SSIM" in text
@@ -642,6 +674,14 @@ def test_scenes_are_checked(scene: bw.Scene) -> None:
         bw.compare(scene, "exact", formats=["r8unorm"])
     with pytest.raises(TypeError, match="lights"):
         bw.Scene(scene.mesh, scene.material, scene.camera, [(0, 0, -1)])  # type: ignore[list-item]
+    assert isinstance(scene.material, bw.Material)
+    other = bw.Instance(bw.Mesh.quad(), bw.Material(height=bw.HeightMap.procedural("sines", 32)))
+    with pytest.raises(ValueError, match="2 height maps"):
+        bw.Scene([bw.Instance(bw.Mesh.quad(), scene.material), other], None, scene.camera)
+    with pytest.raises(ValueError, match="material must be None"):
+        bw.Scene([other], scene.material, scene.camera)
+    with pytest.raises(ValueError, match="no height map"):
+        bw.Scene([other, bw.Instance(bw.Mesh.quad())], None, scene.camera)
     with pytest.raises(TypeError, match="material"):
         bw.Scene(scene.mesh, scene.material.height, scene.camera)  # type: ignore[arg-type]
 

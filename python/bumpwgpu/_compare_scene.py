@@ -83,8 +83,7 @@ def compare_scene(
     exact = _techniques.get("exact")
     picture, check, _ = _measure(scene, exact, truth, False)
     pictures = [Picture("exact", *picture)]
-    height_map = scene.material.height
-    assert height_map is not None
+    height_map = scene.height
     for technique in settings:
         tell(f"errors of {technique!r}")
         name = label(technique.name, technique.parameters)
@@ -117,7 +116,7 @@ def compare_scene(
     environment = {
         **machine(True),
         "map": repr(height_map),
-        "mesh": repr(scene.mesh),
+        "mesh": [repr(part) for part in scene.mesh] if isinstance(scene.mesh, tuple) else repr(scene.mesh),
         "picture": f"{scene.size[0]} x {scene.size[1]}, {truth.count} pixels compared",
         "cameras": len(scene.cameras),
         "repeats": repeats,
@@ -215,7 +214,6 @@ def _shoot(scene: Scene, camera: Camera, technique: Technique, aovs: tuple[str, 
 
 
 def _truth(scene: Scene, cameras: Sequence[Camera], angles: list[float]) -> _Truth:
-    assert scene.material.height is not None
     views, starts, deltas, elevations, edges, dark = [], [], [], [], [], []
     for camera in cameras:
         exact = _shoot(scene, camera, _techniques.get("exact"), (*_AOVS, "ray_start", "ray_delta"))
@@ -231,7 +229,7 @@ def _truth(scene: Scene, cameras: Sequence[Camera], angles: list[float]) -> _Tru
     if not any(view.pixels.any() for view in views):
         raise CompareError("no pixel shows the mesh from the front: nothing to compare; move the camera")
     reference = _bumpwgpu.SegmentReference(
-        scene.material.height._field,
+        scene.height._field,
         np.ascontiguousarray(np.concatenate(starts)),
         np.ascontiguousarray(np.concatenate(deltas)),
     )

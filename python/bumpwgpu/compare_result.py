@@ -323,7 +323,7 @@ class CompareResult:
         ]
 
     def _height_map(self) -> HeightMap | None:
-        return self._source if isinstance(self._source, HeightMap) else self._source.material.height
+        return self._source if isinstance(self._source, HeightMap) else self._source.height
 
     def _verified(self, row: Row, elevation: float | str) -> Row:
         """Metrics of a setting on rays that it was not chosen by."""

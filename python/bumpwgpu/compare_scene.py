@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from ._checks import flag, whole
+from .heightmap import HeightMap
+from .instances import Instance, instances_of
 from .meshes import Mesh
 from .scene import Camera, Light, Material
 
@@ -15,14 +17,15 @@ __all__ = ["Scene"]
 
 @dataclass(frozen=True)
 class Scene:
-    """A mesh with its material, seen by a camera: what `compare` takes besides a height map.
+    """Meshes with their material, seen by a camera: what `compare` takes besides a height map.
 
     Attributes
     ----------
-    mesh : Mesh
-        The mesh.
-    material : Material
-        Its material, with a height map.
+    mesh : Mesh, or Instance or sequence of Instance
+        The mesh, or meshes where they stand. Instances may differ in all but the height map, in whose
+        texels errors are counted.
+    material : Material or None
+        The mesh's material, with a height map; None for instances, which have their own.
     camera : Camera or sequence of Camera
         Where it is seen from; several are a path, and all of their pixels count.
     lights : sequence of Light
@@ -33,20 +36,23 @@ class Scene:
         Whether the relief casts shadows on itself.
     """
 
-    mesh: Mesh
-    material: Material
+    mesh: Mesh | Instance | Sequence[Instance]
+    material: Material | None
     camera: Camera | Sequence[Camera]
     lights: Sequence[Light] = ()
     size: tuple[int, int] = (512, 512)
     shadows: bool = True
 
     def __post_init__(self) -> None:
-        if not isinstance(self.mesh, Mesh):
-            raise TypeError(f"mesh must be a Mesh, got {type(self.mesh).__name__}")
-        if not isinstance(self.material, Material):
+        if isinstance(self.mesh, Mesh) and not isinstance(self.material, Material):
             raise TypeError(f"material must be a Material, got {type(self.material).__name__}")
-        if self.material.height is None:
-            raise ValueError("the material has no height map: there is nothing to compare")
+        if not isinstance(self.mesh, Mesh | Instance):
+            object.__setattr__(self, "mesh", tuple(instances_of(self.mesh, self.material)))
+        heights = {id(height): height for height in self._heights()}
+        if None in heights.values():
+            raise ValueError("a material has no height map: there is nothing to compare")
+        if len(heights) != 1:
+            raise ValueError(f"{len(heights)} height maps: errors are counted in texels of one")
         for camera in self.cameras:
             if not isinstance(camera, Camera):
                 raise TypeError(f"camera must be a Camera or several, got {type(camera).__name__}")
@@ -59,6 +65,18 @@ class Scene:
         object.__setattr__(self, "lights", lights)
         object.__setattr__(self, "size", _size(self.size))
         flag("shadows", self.shadows)
+
+    def _heights(self) -> list[HeightMap | None]:
+        """The height maps of all that is drawn."""
+        placed = instances_of(self.mesh, self.material)
+        return [material.height for instance in placed for *_, material in instance._draws]
+
+    @property
+    def height(self) -> HeightMap:
+        """The height map."""
+        height = self._heights()[0]
+        assert height is not None
+        return height
 
     @property
     def cameras(self) -> tuple[Camera, ...]:
