@@ -408,6 +408,12 @@ heads[p99].querySelector("button").click();
 check("up", sorted(column()) && heads[p99].getAttribute("aria-sort") === "ascending");
 heads[p99].querySelector("button").click();
 check("down", sorted(column().reverse()));
+const mark = [...document.querySelectorAll("#charts > div:not([hidden]) g.mark")].at(-1);
+mark.dispatchEvent(new Event("pointerenter"));
+const pointed = document.getElementById("pointed").textContent;
+check("hover", pointed === mark.querySelector("title").textContent
+  && /exact.* ns a ray, p99 .* texels/.test(pointed)
+  && document.querySelectorAll("g.chosen").length === 1);
 change(document.getElementById("region"), "silhouette");
 check("region", shown().length > 0 && shown().every((row) => row.dataset.region === "silhouette"
   && row.dataset.elevation === "10.0"));
@@ -431,7 +437,7 @@ def test_the_report_works_in_a_browser(result: bw.CompareResult, tmp_path: Path)
     title = re.search(r"<title>(.*?)</title>", done.stdout)
     assert title, done.stderr
     assert "FAILED" not in title[1]
-    assert title[1].count("ok:") == 11
+    assert title[1].count("ok:") == 12
 
 
 def test_pictures_show_the_map_and_where_it_is_wrong(result: bw.CompareResult) -> None:

@@ -108,13 +108,16 @@ def _marker(p: Point, color: str, x: _Scale, y: _Scale, unit: str) -> str:
     radius = 6 if p.on_front else 4.5
     edge = "currentColor" if p.on_front else color
     fill = color if p.reliable else "var(--page)"
-    title = f"{p.label}: {p.time_ns:.4g} ns a {unit}, p99 {p.error_texels:.3g} texels"
+    least = "\N{LESS-THAN OR EQUAL TO} " if p.error_texels <= FLOOR_TEXELS else ""
+    title = f"{p.label}: {p.time_ns:.4g} ns a {unit}, p99 {least}{p.error_texels:.3g} texels"
     if not p.reliable:
         title += ", fails"
     return (
-        f"<g><title>{escape(title)}</title>"
+        f'<g class="mark" tabindex="0"><title>{escape(title)}</title>'
         f'<path d="M{x(p.low_ns):.1f} {at_y:.1f}H{x(p.high_ns):.1f}" stroke="{color}" opacity="0.6"/>'
-        f'<circle cx="{at_x:.1f}" cy="{at_y:.1f}" r="{radius}" fill="{fill}" stroke="{edge}"/></g>'
+        f'<circle cx="{at_x:.1f}" cy="{at_y:.1f}" r="{radius}" fill="{fill}" stroke="{edge}"/>'
+        # Wide enough for a finger.
+        f'<circle class="reach" cx="{at_x:.1f}" cy="{at_y:.1f}" r="12"/></g>'
     )
 
 
