@@ -193,6 +193,13 @@ def test_values_are_in_the_units_of_engines(hills: bw.HeightMap) -> None:
     assert godot.values["heightmap_scale"] == pytest.approx(3.0)
     assert (godot.values["heightmap_min_layers"], godot.values["heightmap_max_layers"]) == (48, 48)
     assert "material.heightmap_deep_parallax = true" in str(godot)
+    # Its steps are those of offset limiting: near to what was measured from above alone.
+    assert not godot.built_in
+    assert "half its depth at 30 degrees" in str(godot)
+    plain = engine_settings("parallax_limited", {}, hills, "godot")
+    assert plain.built_in
+    assert plain.values["heightmap_deep_parallax"] is False
+    assert not engine_settings("parallax", {}, hills, "godot").values["heightmap_enabled"]
     many = engine_settings("pom", {"steps": 200}, hills, "godot")
     assert not many.built_in
     assert any("at most 64 layers" in note for note in many.notes)

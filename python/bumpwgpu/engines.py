@@ -15,7 +15,7 @@ ENGINES = ("bevy", "godot", "threejs", "unity_hdrp")
 #: Techniques that an engine's own material has; `recommend(among=...)` takes these.
 BUILT_IN: dict[str, tuple[str, ...]] = {
     "bevy": ("pom", "relief"),
-    "godot": ("parallax", "pom"),
+    "godot": ("parallax_limited",),
     "threejs": (),
     "unity_hdrp": ("pom",),
 }
@@ -82,10 +82,11 @@ def engine_settings(
     layers = parameters.get("steps", parameters.get("linear"))
     built_in = technique in BUILT_IN[engine]
     notes = []
-    if built_in and layers is not None and layers > _MOST_LAYERS.get(engine, 1 << 30):
+    nearest = engine == "godot" and technique == "pom"
+    if (built_in or nearest) and layers is not None and layers > _MOST_LAYERS.get(engine, 1 << 30):
         built_in = False
         notes.append(f"the material takes at most {_MOST_LAYERS[engine]} layers, and {layers} are needed")
-    elif not built_in:
+    elif not built_in and not nearest:
         notes.append(f"no built-in material does {technique}; take the search from shader()")
     values, more = _MATERIALS[engine](technique, parameters, layers, height_map, built_in)
     return EngineSettings(engine, built_in, values, (*notes, *more))
@@ -130,14 +131,25 @@ def _godot(
     technique: str, parameters: dict[str, int], layers: int | None, height_map: HeightMap, built_in: bool
 ) -> tuple[dict[str, Any], list[str]]:
     # Godot multiplies heightmap_scale by 0.01.
-    values: dict[str, Any] = {"heightmap_enabled": built_in, "heightmap_scale": 100.0 * _depth_uv(height_map)}
-    if built_in:
-        values["heightmap_deep_parallax"] = technique == "pom"
-        if technique == "pom":
-            values["heightmap_min_layers"] = layers
-            values["heightmap_max_layers"] = layers
+    deep = technique == "pom" and layers is not None and layers <= _MOST_LAYERS["godot"]
+    values: dict[str, Any] = {
+        "heightmap_enabled": built_in or deep,
+        "heightmap_scale": 100.0 * _depth_uv(height_map),
+    }
+    notes = []
+    if built_in or deep:
+        values["heightmap_deep_parallax"] = deep
+    if deep:
+        values["heightmap_min_layers"] = layers
+        values["heightmap_max_layers"] = layers
+    if technique == "pom":
+        # Its shader steps by the view direction's x and y without dividing them by z.
+        notes.append(
+            "Godot's deep parallax flattens the relief at low angles, to half its depth at 30 degrees: the "
+            "error is not the one that was measured; take the search from shader() for that"
+        )
     values["heightmap_flip_texture"] = False
-    notes = ["import the height texture as linear data, lossless or VRAM uncompressed"]
+    notes.append("import the height texture as linear data, lossless or VRAM uncompressed")
     if height_map.scale > 0.0 and abs(values["heightmap_scale"]) > 16.0:
         notes.append("the editor's slider for heightmap_scale ends at 16; set it from a script")
     return values, [*notes, *_base_note(height_map, 1.0, "Godot"), *_square_note(height_map)]
