@@ -154,8 +154,8 @@ def test_grazing_views_are_those_of_displacement(name: str) -> None:
 
 
 # Height of the relief, in shares of the model's size, and how many pixels of a picture may be astray: on
-# rancid_geometry normals at the corners of slivers are up to 168 degrees apart, and carved into those the surface
-# runs through itself.
+# rancid_geometry normals at the corners of slivers are up to 168 degrees apart, and carved into those the
+# surface runs through itself.
 MODELS = {
     "obj/mikktspace/doomcone_smooth.obj": (0.02, 0),
     "obj/mikktspace/rancid_geometry.obj": (0.01, 1),
