@@ -278,7 +278,7 @@ def render(
     skip : bool or iterable of str, default True
         What to leave out where the picture does not need it: all of it, nothing, or some of
         :data:`bumpwgpu.rendering.SKIPS`. ``frame.stats["skipped"]`` counts what was left out: triangles
-        outside the picture ("frustum"), facing away ("backface") and behind walls ("occlusion"), draws
+        outside the picture ("frustum"), facing away ("backface") and behind others ("occlusion"), draws
         moved ahead of what they hide ("depth_first"); pixels on flat ground ("flat"), with no visible
         parallax ("parallax") or marched over less of their ray ("range"); shadow rays that hide no light
         ("shadow").

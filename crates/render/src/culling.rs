@@ -10,6 +10,7 @@ use glam::{DMat4, DVec3};
 
 use crate::camera::Frustum;
 use crate::clusters::Cluster;
+use crate::covers::{Candidate, Covers};
 use crate::walls::{Screen, Wall};
 use crate::{Camera, Skipped, Skips};
 
@@ -31,6 +32,8 @@ pub(crate) struct Culling {
     off: f64,
     /// Walls that hide what is behind them.
     screens: Vec<Screen>,
+    /// What other meshes hide.
+    covers: Option<Covers>,
 }
 
 /// Merges runs that follow one another.
@@ -56,6 +59,8 @@ pub(crate) struct Stand {
     pub radius: f64,
     /// Whether backs show as well.
     pub double_sided: bool,
+    /// Whether the transform turns the winding around.
+    pub mirrored: bool,
 }
 
 impl Stand {
@@ -71,6 +76,7 @@ impl Stand {
             stretch,
             radius: radius * stretch,
             volume: relative_from_object.determinant().abs(),
+            mirrored: relative_from_object.determinant() < 0.0,
             double_sided,
         }
     }
@@ -98,6 +104,7 @@ impl Culling {
             near: camera.near(),
             off: SNAP + width.max(height) * 1e-6,
             screens: Vec::new(),
+            covers: None,
         }
     }
 
@@ -178,9 +185,33 @@ impl Culling {
         self.screens.truncate(MOST_SCREENS);
     }
 
-    /// Whether a ball relative to the camera is behind a wall.
+    /// Takes into account what meshes cover.
+    pub fn add_covers(&mut self, draws: &[Candidate<'_>]) {
+        self.covers = Covers::of(draws, self);
+    }
+
+    /// Whether a ball relative to the camera is behind a wall or another mesh.
     pub fn is_hidden(&self, centre: DVec3, radius: f64) -> bool {
+        let behind = |covers: &Covers| {
+            self.outline(centre, radius).is_some_and(|outline| covers.hides(&outline, self.size))
+        };
         self.screens.iter().any(|screen| screen.hides(centre, radius, 1.0 / self.focal))
+            || self.covers.as_ref().is_some_and(behind)
+    }
+
+    /// Pixels of the picture across and down.
+    pub fn size(&self) -> [f64; 2] {
+        self.size
+    }
+
+    /// Where a point relative to the camera is in the picture, pixels across and down, and its depth; `None` before the
+    /// near plane.
+    pub fn in_picture(&self, point: DVec3) -> Option<[f64; 3]> {
+        let Frustum { right, up, forward, .. } = self.frustum;
+        let [x, y, depth] = [right, -up, forward].map(|axis| point.dot(axis));
+        let [width, height] = self.size;
+        let place = |at: f64, share: f64| 0.5 * share + self.focal * at / depth;
+        (depth > self.near * 1.01).then(|| [place(x, width), place(y, height), depth])
     }
 
     /// Runs of triangles that may be seen. `solid`: whether nothing shows before the triangles themselves.

@@ -12,6 +12,7 @@ pub mod adapter;
 pub mod bounds;
 pub mod camera;
 mod clusters;
+mod covers;
 mod culling;
 pub mod device;
 pub mod error;

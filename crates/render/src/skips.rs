@@ -14,7 +14,7 @@ impl Skips {
     pub const FRUSTUM: Self = Self(1);
     /// Clusters that turn their backs to the camera.
     pub const BACKFACE: Self = Self(1 << 1);
-    /// Draws and clusters behind walls.
+    /// Draws and clusters behind walls and other meshes.
     pub const OCCLUSION: Self = Self(1 << 2);
     /// Light on what others hide: near draws come first.
     pub const DEPTH_FIRST: Self = Self(1 << 3);

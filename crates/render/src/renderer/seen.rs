@@ -3,6 +3,7 @@
 use glam::{DMat4, DVec3};
 
 use super::Renderer;
+use crate::covers::Candidate;
 use crate::culling::{Culling, Stand};
 use crate::geometry::Room;
 use crate::prepare::address;
@@ -52,6 +53,31 @@ impl Renderer<'_> {
         culling.settle_walls();
     }
 
+    /// Tells what meshes of the scene cover what is behind them.
+    fn find_covers(&self, camera: &Camera, culling: &mut Culling) {
+        let displaced = self.request.in_shell() || self.request.technique.draws_geometry();
+        if displaced || !self.request.skips.contains(Skips::OCCLUSION) || self.scene.draws.len() < 2 {
+            return;
+        }
+        let candidate = |(at, draw): (usize, &'_ Draw<'_>)| {
+            let stand = self.stands(at, camera, culling)?;
+            let outline = culling.outline(stand.relative_from_object.w_axis.truncate(), stand.radius)?;
+            Some((at, draw.triangles.clone(), stand, outline))
+        };
+        let found: Vec<_> = self.scene.draws.iter().enumerate().filter_map(candidate).collect();
+        let candidates: Vec<_> = found
+            .into_iter()
+            .map(|(at, triangles, stand, outline)| {
+                let Draw { mesh, material, .. } = &self.scene.draws[at];
+                let extent = material.field.extent();
+                let depth = if self.request.technique.displaces() { extent.scale * extent.base } else { 0.0 };
+                let middle = self.rooms.get(&address(mesh)).map_or(DVec3::ZERO, |room| room.middle);
+                Candidate { mesh, triangles, middle, stand, outline, depth: f64::from(depth) }
+            })
+            .collect();
+        culling.add_covers(&candidates);
+    }
+
     /// Builds the solids of the scene where programs read them and places them for a view: all of them, since
     /// what is outside the picture may throw a shadow into it. Gives for each draw what
     /// [`DrawInfo::own`] holds.
@@ -89,6 +115,7 @@ impl Renderer<'_> {
     ) -> Result<Vec<Call>, RenderError> {
         let mut culling = self.culling(camera);
         self.find_walls(camera, &mut culling);
+        self.find_covers(camera, &mut culling);
         let numbers = self.place_solids(camera)?;
         let mut view = ViewOf::new(&self.device, camera, &self.request, &culling);
         let stride = self.shared.stride as usize;
