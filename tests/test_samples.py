@@ -80,25 +80,13 @@ def test_highlights_keep_their_light_from_afar() -> None:
     assert error < 0.5 * plain
 
 
-def test_highlights_flicker_less_when_the_camera_moves() -> None:
-    """Frames of a camera that moves an eighth of a pixel at a time: how much pixels change from one to the next."""
-
-    def change(**options: object) -> float:
-        frames = [glints(32, step * 2.4 * np.tan(np.radians(10)) / 128, **options) for step in range(6)]
-        return float(np.mean([np.abs(b - a).mean() for a, b in zip(frames, frames[1:], strict=False)]))
-
-    still, flickering = change(), change(specular_aa=False)
-    print(f"mean change of a pixel {still:.5f}, without antialiasing {flickering:.5f}")
-    assert 0 < still < 0.5 * flickering
-
-
 @pytest.mark.parametrize(
     ("technique", "silhouettes"),
     [("exact", True), ("exact", False), ("relief", False), ("displacement", False)],
 )
 def test_steps_have_no_seam_of_wrong_detail(technique: str, silhouettes: bool) -> None:
-    """A map of black and white halves, drawn much larger than its texels, lit from everywhere: what is neither black
-    nor white off the borders of the halves was read from a level that is too coarse."""
+    """A map of black and white halves, larger than its texels, lit from everywhere: what is neither
+    black nor white off the borders of the halves was read from a level that is too coarse."""
     halves = np.zeros((256, 256), np.uint8)
     halves[:, 128:] = 255
     frame = bw.render(
@@ -119,6 +107,6 @@ def test_steps_have_no_seam_of_wrong_detail(technique: str, silhouettes: bool) -
     grey = np.abs(frame.color[..., 0] - 127.5) < 125
     assert off.sum() > 10_000
     assert not (grey & off).any()
-    # Negative control: differences between neighbouring pixels, which derivatives along the screen are, jump there.
+    # Negative control: from one pixel to the next, as derivatives along the screen are taken, places jump.
     jumps = np.linalg.norm(np.diff(uv, axis=1), axis=2) * 256
     assert (jumps[covered[:, 1:] & covered[:, :-1]] > 8).sum() > 100
