@@ -31,7 +31,8 @@ fn hidden(point: ShadowPoint, to_light: vec3f, distant: bool) -> Hidden {
         return Hidden(0.0, select(SHADOW_RAYS, 0u, skip_shadow));
     }
     var stretch = WHOLE_STRETCH;
-    if skip_shadow && cast_shadows {
+    // Searches whose hits may lie anywhere promise nothing of what they meet from there.
+    if skip_shadow && cast_shadows && slack(1.0) < 1.0 {
         let until = clears(point.place, ray.delta);
         if until <= 0.0 {
             return Hidden(0.0, 0u);

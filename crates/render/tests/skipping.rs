@@ -17,9 +17,6 @@ use render::{
 };
 
 const SIZE: [u32; 2] = [128, 96];
-/// Pixels that may be off by more than the bound: those where rounding turns a ray that just touches an edge of the
-/// relief. Measured: at most 4 of 12288.
-const TOUCHING: usize = 6;
 
 /// Flat, with steps up and down: the ground of most of the things people make.
 fn plateaus(u: f64, v: f64) -> f64 {
@@ -40,6 +37,10 @@ fn level(_: f64, _: f64) -> f64 {
 fn rough(u: f64, v: f64) -> f64 {
     common::fbm(u, v)
 }
+
+/// Shadow rays from hits that no search with layers has found may say something else when they are not followed, at
+/// this many pixels of 12288 at most, on curved meshes seen from near. Measured: 6, the same ones for every search.
+const SELF_SHADOWED: usize = 6;
 
 type Heights = fn(f64, f64) -> f64;
 const MAPS: [(&str, Heights); 5] =
@@ -176,7 +177,7 @@ fn within_the_bound(every: usize, wanted: impl Fn(&str) -> bool) {
             let plain = picture(&device, &case, choice, Skips::NONE, &[sun(LIGHT)]);
             let spared = picture(&device, &case, choice, Skips::ALL, &[sun(LIGHT)]);
             let off = beyond(&case, &flat, &plain, &spared, 1.0);
-            assert!(off <= TOUCHING, "{name} on {}: {off} pixels are off", case.name);
+            assert_eq!(off, 0, "{name} on {}: pixels are off", case.name);
             for (kind, count) in spared.stats.skipped.iter() {
                 skipped.add(Skips::named(kind).unwrap(), count);
             }
@@ -207,7 +208,7 @@ fn a_wrong_bound_is_noticed() {
     let aovs = AovSet::UV | AovSet::MASK;
     let request = Request { aovs, skip_error, ..Request::new(exact, SIZE[0], SIZE[1]) };
     let loose = render::render(&device, &scene, &request).unwrap();
-    assert!(beyond(&case, &flat, &plain, &loose, 1.0) > 10 * TOUCHING);
+    assert!(beyond(&case, &flat, &plain, &loose, 1.0) > 60);
 }
 
 /// Without bounds to go by, rays cut short and rays left out must give the very same picture.
@@ -242,14 +243,12 @@ fn same_pixels(every: usize, wanted: impl Fn(&str) -> bool) {
             };
             let (a, b) = (plain.aovs.uv.as_ref().unwrap(), spared.aovs.uv.as_ref().unwrap());
             let off = differing(2, a, b, if layered { 0.0 } else { 2e-5 });
-            assert!(off <= if layered { 0 } else { TOUCHING }, "{name} on {}: {off} hits differ", case.name);
+            assert_eq!(off, 0, "{name} on {}: hits differ", case.name);
             let (a, b) = (plain.aovs.shadow.as_ref().unwrap(), spared.aovs.shadow.as_ref().unwrap());
             let off = differing(1, a, b, 0.0);
-            assert!(
-                off <= if layered { 0 } else { TOUCHING },
-                "{name} on {}: {off} shadows differ",
-                case.name
-            );
+            let kept = layered || matches!(technique.info.reads, Reads::ConeTexel | Reads::RelaxedConeTexel);
+            let most = if kept { 0 } else { SELF_SHADOWED };
+            assert!(off <= most, "{name} on {}: {off} shadows differ", case.name);
         }
     }
 }
