@@ -123,6 +123,14 @@ def test_filters_and_units_of_bakes_are_found() -> None:
 
     assert not bake_only("horizon", turned)
 
+    for factor in (0.99, 1.01):
+
+        def bent(*arguments: Any, factor: float = factor, **options: Any) -> Any:
+            return {"horizon": bw.bake(*arguments, **options)["horizon"] * factor}
+
+        found = bw.stress([], maps=["horizon"], frames=[], bake=bent)
+        assert "horizons" in checks(found), factor
+
     def raised(*arguments: Any, **options: Any) -> Any:
         return {"horizon": np.minimum(bw.bake(*arguments, **options)["horizon"] + 0.01, 1.0)}
 

@@ -25,12 +25,10 @@ SKY_MAPS = ("horizon", "ao", "bent_normal")
 MOST_AO = 5e-3
 #: Mean angle of bent normals to the hemisphere's, degrees. Measured: at most 0.21, on a checkerboard.
 MOST_BENT = 0.5
-#: Mean difference of horizons besides what lines beside a texel account for: these start at other heights,
-#: which sweeps make up for in the mean of two lines. Measured: at most 0.0004, around a pit of one texel.
-MOST_BESIDE = 1e-3
-#: Mean difference of horizons whatever accounts for it. Measured: at most 0.006, on a checkerboard, where
-#: bakes look further than one length of the map.
-MOST_HORIZON = 0.01
+#: Mean difference of horizons besides what lines beside a texel account for: 16 roundings to 32 bits.
+MOST_BESIDE = 1e-6
+#: Mean difference of horizons whatever accounts for it. Measured: at most 0.002, around a spike of one texel.
+MOST_HORIZON = 0.004
 #: Texels looked at, azimuths of occlusion and bent normals (the bakes' default), elevations of the sky.
 _TEXELS, _AZIMUTHS, _ELEVATIONS = 48, 32, 512
 
