@@ -22,6 +22,8 @@ mod patch;
 mod rays;
 mod texels;
 
+use std::time::{Duration, Instant};
+
 use heightfield::HeightField;
 use heightfield::lanes::{Kernel, Lanes, dispatch};
 use rayon::prelude::*;
@@ -37,9 +39,10 @@ use texels::Texels;
 const TOLERANCE: f64 = 1.0 / 256.0;
 
 /// Rows of a strip, which one thread works through.
-const STRIP: usize = 16;
-/// Strips between two looks at the progress.
-const BATCH: usize = 8;
+const STRIP: usize = 8;
+/// How long strips may take between two looks at the progress, if there is more than one a thread; more are taken
+/// together while they take less than half of it.
+const PATIENCE: Duration = Duration::from_millis(250);
 
 /// Bytes that a bake needs besides its result.
 pub(super) fn working_bytes(grid: maps::Grid) -> u128 {
@@ -111,15 +114,25 @@ fn search<A: Apexes>(
     let first = -field.first_texel();
     let mut plane = Plane::new(width, height, 0.0);
     let stride = plane.stride;
-    progress.report(0, height + 2)?;
-    for (batch, rows) in plane.values.chunks_mut(BATCH * STRIP * stride).enumerate() {
-        let done = batch * BATCH * STRIP;
-        rows.par_chunks_mut(STRIP * stride).enumerate().for_each(|(strip, slopes)| {
+    let threads = rayon::current_num_threads();
+    let (mut done, mut strips) = (0, threads);
+    while done < height + 2 {
+        progress.report(done, height + 2)?;
+        let start = Instant::now();
+        let rows = (strips * STRIP).min(height + 2 - done);
+        let batch = &mut plane.values[done * stride..][..rows * stride];
+        batch.par_chunks_mut(STRIP * stride).enumerate().for_each(|(strip, slopes)| {
             let top = (done + strip * STRIP) as i64 - 1;
             dispatch(Strip { apexes, first, top, stride, slopes });
         });
-        progress.report(done + rows.len() / stride, height + 2)?;
+        done += rows;
+        strips = match start.elapsed() {
+            long if long > PATIENCE => (strips / 2).max(threads),
+            short if short < PATIENCE / 2 => strips * 2,
+            _ => strips,
+        };
     }
+    progress.report(done, height + 2)?;
     Ok(plane)
 }
 

@@ -25,7 +25,9 @@ const MOST: usize = 16;
 const LEAF: usize = 1;
 /// How often a ray, or those through a block, are looked at in vain before one by one.
 const TRIES_OF_TEXEL: u32 = 8;
-const TRIES_OF_BLOCK: u32 = 2;
+const TRIES_OF_BLOCK: u32 = 1;
+/// Samples of a row farther apart than this many texels are looked at one by one.
+const WIDEST: f64 = 16.0;
 
 /// Texels in a row and what is known of them.
 pub(super) struct Rays<'a, L: Lanes> {
@@ -130,13 +132,44 @@ impl<'a, L: Lanes> Rays<'a, L> {
         self.follow(block, lanes, last)
     }
 
+    /// Whether the surface is above a sample of the rays through one texel, those of all lanes: they lie on a line along the
+    /// row, where the surface is straight from column to column.
+    #[inline(always)]
+    fn is_inside(&self, texel: &Block, k: u32) -> bool {
+        let out = out(f64::from(texel.height[0]), k);
+        let field = self.texels.field;
+        let place = |axis: usize, lane: usize| {
+            let apex = (self.row.site[axis] + lane as i64) as f64;
+            apex + out * (texel.first[axis] as f64 - apex)
+        };
+        let (ends, y) = ([place(0, L::WIDTH - 1), place(0, 0)], place(1, 0));
+        let [from, to] = [ends[0].min(ends[1]), ends[0].max(ends[1])];
+        if to - from > WIDEST {
+            return false;
+        }
+        let first = field.first_texel() as f64 + 0.5;
+        let z = f64::from(texel.height[0]) * share(k) + HEIGHT_MARGIN;
+        let mut x = from;
+        loop {
+            if field.height_at((x + first) * self.texels.step[0], (y + first) * self.texels.step[1]) <= z {
+                return false;
+            }
+            if x >= to {
+                return true;
+            }
+            x = (x.floor() + 1.0).min(to);
+        }
+    }
+
     /// Those of the lanes for which a ray through the block may come out up to sample `last`, and the first sample that
     /// may be out. The samples are looked at all at once, or half of them and then the rest, and so on.
     #[inline(always)]
     fn follow(&self, block: &Block, lanes: L::M, last: u32) -> (L::M, u32) {
         let tops = block.height.map(f64::from);
         let (mut from, mut to) = (1, last);
-        let mut tries = if block.first == block.last { TRIES_OF_TEXEL } else { TRIES_OF_BLOCK };
+        // A block of one cell has the heights of all its corners.
+        let alone = block.first == block.last && block.height[0] == block.height[1];
+        let mut tries = if alone { TRIES_OF_TEXEL } else { TRIES_OF_BLOCK };
         while from <= last {
             let between = [out(tops[0], from - 1), out(tops[1], to)];
             let surface = self.texels.blocks.over(self.places(block, between));
@@ -146,10 +179,13 @@ impl<'a, L: Lanes> Rays<'a, L> {
                 continue;
             }
             tries -= 1;
-            if from == to || tries == 0 {
+            if from == to && alone && self.is_inside(block, from) {
+                (from, to) = (from + 1, last);
+            } else if from == to || tries == 0 {
                 return (lanes, from);
+            } else {
+                to = from + (to - from) / 2;
             }
-            to = from + (to - from) / 2;
         }
         (L::first(0), last)
     }
