@@ -367,6 +367,18 @@ def test_tagged_and_hostile_textures(normals: np.ndarray, tmp_path: Path) -> Non
             bw.HeightMap(path, channel="r")
 
 
+def test_palettes_are_looked_up(tmp_path: Path) -> None:
+    path = tmp_path / "wall_height.dds"
+    Image.new("RGBA", (16, 16)).save(path)
+    header = bytearray(path.read_bytes()[:128])
+    # 8 bits a texel, indices into 256 colours.
+    struct.pack_into("<2I4s5I", header, 76, 32, 0x20, bytes(4), 8, 0, 0, 0, 0)
+    palette = b"".join(bytes([255 - index, 0, 0, 255]) for index in range(256))
+    path.write_bytes(bytes(header) + palette + bytes(range(256)))
+    heights = bw.HeightMap(path, channel="r").array
+    np.testing.assert_allclose(heights.ravel(), np.arange(255, -1, -1) / 255, atol=1e-6)
+
+
 def test_a_texture_of_a_terrain(assets: Path) -> None:
     path = assets / "ogre" / "Bricks076C_normheight.dds"
     if not path.exists():

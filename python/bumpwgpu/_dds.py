@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _bumpwgpu
+from ._images import read_pil
 from .errors import BakeError
 
 __all__ = ["read_dds"]
@@ -30,7 +31,7 @@ def read_dds(path: Path) -> tuple[NDArray[np.uint8], list[str]]:
     BakeError
         Not such a file, one cut short, or of a format that is not read.
     """
-    from PIL import Image
+    from PIL.DdsImagePlugin import DdsImageFile
 
     data = bytearray(path.read_bytes())
     notes = []
@@ -48,14 +49,15 @@ def read_dds(path: Path) -> tuple[NDArray[np.uint8], list[str]]:
             struct.pack_into("<I", data, _HEADER, _LINEAR[kind])
             notes.append("is tagged sRGB; its numbers are read as linear data")
     try:
-        with Image.open(io.BytesIO(data), formats=("DDS",)) as image:
+        # Not by Image.open, which refuses sides of 16384.
+        with DdsImageFile(io.BytesIO(data)) as image:
             if "gamma" in image.info:
                 notes.append("is tagged sRGB; its numbers are read as linear data")
             # BC1 to BC3 keep colours of 5 or 6 bits a channel; alpha, and BC4 up, fare better.
             blocks = str(getattr(image, "pixel_format", ""))
             if blocks in ("DXT1", "DXT3", "DXT5", "BC1", "BC2", "BC3"):
                 notes.append(f"is compressed in blocks of few colours ({blocks})")
-            values = np.asarray(image)
+            values = read_pil(image).values
     except Exception as error:  # Pillow's readers raise whatever they come across
         text = str(error).splitlines()
         raise BakeError(f"{path}: {text[0] if text else type(error).__name__}") from None

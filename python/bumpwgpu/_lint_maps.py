@@ -14,7 +14,7 @@ from .errors import BumpError, BumpWarning
 from .heightmap import HeightMap, Wrap
 from .repair import NormalReport, check_normals, tile_report
 
-__all__ = ["alpha_heights", "cone_findings", "height_findings", "normal_findings"]
+__all__ = ["alpha_heights", "cone_findings", "height_findings", "normal_findings", "unreadable"]
 
 Found = tuple[str, str, str, str]
 
@@ -42,7 +42,7 @@ def height_findings(
             warnings.simplefilter("ignore", BumpWarning)
             heights = HeightMap(source, wrap=wrap, tile_size=tile_size, invert=inverted)
     except (BumpError, ValueError, TypeError, OSError) as error:
-        return [*found, _unreadable(error)], None
+        return [*found, unreadable(error)], None
     low, high = float(heights.array.min()), float(heights.array.max())
     if low == high:
         found.append(("flat-heights", "warning", f"all heights are {low:g}", "Leave the map out."))
@@ -117,7 +117,7 @@ def normal_findings(
         found += _tags(pixels.warnings)
         report = check_normals(source, partner, wrap=wrap)
     except (BumpError, ValueError, TypeError, OSError) as error:
-        return [*found, _unreadable(error)]
+        return [*found, unreadable(error)]
     found += _vectors(report, pixels.values.shape[-1])
     if not alpha_is_heights and pixels.values.shape[-1] == 4 and np.ptp(pixels.values[..., 3]) > 0:
         fix = "Name the file _nh when these are heights, and they are looked at too."
@@ -258,7 +258,7 @@ def cone_findings(source: Any, role: str, partner: HeightMap | None) -> list[Fou
     try:
         pixels = read_any(source, "cones")
     except (BumpError, ValueError, TypeError, OSError) as error:
-        return [_unreadable(error)]
+        return [unreadable(error)]
     found = _tags(pixels.warnings)
     if partner is None:
         fix = "Give the height map too."
@@ -300,6 +300,7 @@ def _tags(texts: list[str]) -> list[Found]:
     return found
 
 
-def _unreadable(error: BaseException) -> Found:
+def unreadable(error: BaseException) -> Found:
+    """What is said of a file that could not be read."""
     text = str(error).splitlines()
     return ("unreadable", "error", text[0] if text else type(error).__name__, "Export the file again.")

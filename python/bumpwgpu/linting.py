@@ -13,7 +13,7 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 
 from ._atomic import replace_file
 from ._checks import choice, number
-from ._lint_maps import alpha_heights, cone_findings, height_findings, normal_findings
+from ._lint_maps import alpha_heights, cone_findings, height_findings, normal_findings, unreadable
 from ._lint_mesh import inside_one_tile, mesh_findings
 from .errors import BumpError
 from .heightmap import HeightMap, Wrap, checked_extent
@@ -292,7 +292,7 @@ def _check(part: _Part, settings: dict[str, Any], heights: dict[tuple[str, str],
             try:
                 source = alpha_heights(source)
             except (BumpError, ValueError, TypeError, OSError) as error:
-                return [("unreadable", "error", str(error).splitlines()[0], "Export the file again.")]
+                return [unreadable(error)]
         inverted = "depth" in part.words if settings["invert"] is None else settings["invert"]
         found, checked = height_findings(source, wrap, tile, inverted)
         if checked is not None:

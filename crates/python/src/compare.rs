@@ -362,8 +362,7 @@ fn timing([low_ns, median_ns, high_ns]: [f64; 3]) -> Timing {
 
 /// Indices of the settings on the Pareto front, by rising time, each with those whose time cannot be told from
 /// its own and that are on the front too or would be, were the tie broken in their favour; and those of these that
-/// may take its place. Settings that fail on more than `max_failure_rate` of the rays cannot be
-/// on it.
+/// may take its place. Settings that fail on more than `max_failure_rate` of the rays cannot be on it.
 #[pyfunction]
 pub fn compare_front(measured: Vec<Measured>, max_failure_rate: f64) -> Vec<(usize, Vec<usize>, Vec<usize>)> {
     let candidates: Vec<Candidate> = measured
