@@ -268,7 +268,8 @@ def lint(
     # Maps beside a mesh whose UVs stay inside one tile need not tile.
     charts = {part.family[0] for part in parts if part.role == "mesh" and inside_one_tile(part.source)}
     # Heights first: the other maps are held against them.
-    for part in sorted(parts, key=lambda part: part.role not in ("height", "alpha height")):
+    order = {"height": 0, "alpha height": 1}
+    for part in sorted(parts, key=lambda part: order.get(part.role, 2)):
         for code, severity, message, fix in _check(part, settings, heights):
             if code == "tile-seam" and severity == "error" and part.family[0] in charts:
                 severity, message = "warning", f"{message}; the mesh beside it stays inside one tile"
@@ -296,7 +297,8 @@ def _check(part: _Part, settings: dict[str, Any], heights: dict[tuple[str, str],
         inverted = "depth" in part.words if settings["invert"] is None else settings["invert"]
         found, checked = height_findings(source, wrap, tile, inverted)
         if checked is not None:
-            heights[part.family] = checked
+            # Heights that are given go before those in the alpha channel, which come later.
+            heights.setdefault(part.family, checked)
         return found
     partner = _partner(part, heights)
     if part.role == "normal":

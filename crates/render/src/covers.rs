@@ -16,6 +16,8 @@ const MOST_PARTS: usize = 400_000;
 const LEAST_SHARE: f64 = 1.0 / 1024.0;
 /// Sine of the flattest view of a triangle that counts: below it rays run far along the relief.
 const FLATTEST: f64 = 0.1;
+/// Least cosine between two normals of a triangle that counts: 30 degrees apart.
+const LEAST_COSINE: f32 = 0.866;
 /// Pixels around what is tested, for what outlines are rounded by.
 const MARGIN: f64 = 2.0;
 
@@ -54,13 +56,13 @@ impl Covers {
             .collect();
         largest.sort_by(|a, b| share(&b.outline, picture).total_cmp(&share(&a.outline, picture)));
         let mut parts = 0;
-        largest.truncate(MOST_COVERS);
         largest.retain(|draw| {
             let own = draw.mesh.positions.len() + draw.triangles.len();
             let fits = parts + own <= MOST_PARTS;
             parts += if fits { own } else { 0 };
             fits
         });
+        largest.truncate(MOST_COVERS);
         let outlines = || largest.iter().map(|draw| &draw.outline);
         let low = [0, 1].map(|axis| outlines().map(|o| o.low[axis]).fold(f64::INFINITY, f64::min).max(0.0));
         let high = [0, 1].map(|axis| {
@@ -92,8 +94,9 @@ impl Covers {
             // Rows run down: what is wound counter-clockwise has a negative area.
             let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
             let (least, most) = (a[3].min(b[3]).min(c[3]), a[3].max(b[3]).max(c[3]));
-            // Where rays go as deep at all corners, they go no more than twice as deep between them.
-            if area * turned < 0.0 && most <= 2.0 * least {
+            // Where rays go as deep at all corners, and normals are nearly the same, they go no more than twice as deep
+            // between them.
+            if area * turned < 0.0 && most <= 2.0 * least && turns_little(draw.mesh, *triangle) {
                 self.fill([a, b, c], a[2].max(b[2]).max(c[2]) * (1.0 + 2.0 * most));
             }
         }
@@ -158,6 +161,12 @@ impl Covers {
             self.cells[y * across + left..y * across + right].iter().all(|&far| f64::from(far) < near)
         })
     }
+}
+
+/// Whether the normals at the corners of a triangle are close together.
+fn turns_little(mesh: &Mesh, triangle: [u32; 3]) -> bool {
+    let [a, b, c] = triangle.map(|at| mesh.normals[at as usize].normalize_or_zero());
+    a.dot(b).min(b.dot(c)).min(c.dot(a)) >= LEAST_COSINE
 }
 
 /// Where an edge crosses a row; the corners in the order of their rows.

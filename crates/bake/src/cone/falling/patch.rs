@@ -125,7 +125,7 @@ fn attained(a: &Patch, b: &Patch) -> f64 {
 /// `h(y) - h(x) - p . (y - x)` is bilinear in `x` and in `y`, so its maximum lies at corners: where it is not
 /// above zero at any pair of corners, no pair of points rises that much. Vectors tried are: one that
 /// is the mean gradient across the way from `a` to `b`, which takes the common tilt of the surface away, and as long as
-/// it may be along it; one that leads along the way; and one between them.
+/// it may be along it; one that leads along the way; one between them; and one that takes the gradient at `y` off.
 fn may_rise(a: &Patch, b: &Patch, slope: f64) -> bool {
     let (from, to, half) = (a.centre(), b.centre(), [a.half(), b.half()]);
     let centre = [to[0] - from[0], to[1] - from[1]];

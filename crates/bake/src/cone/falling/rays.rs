@@ -178,7 +178,7 @@ impl<'a, L: Lanes> Rays<'a, L> {
                 (from, to) = (to + 1, last);
                 continue;
             }
-            tries -= 1;
+            tries = tries.saturating_sub(1);
             if from == to && alone && self.is_inside(block, from) {
                 (from, to) = (from + 1, last);
             } else if from == to || tries == 0 {
