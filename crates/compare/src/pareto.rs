@@ -28,10 +28,6 @@ impl Candidate {
     }
 }
 
-fn is_fit(candidate: &Candidate) -> bool {
-    candidate.eligible && candidate.error.is_finite()
-}
-
 fn no_less_accurate(a: &Candidate, b: &Candidate) -> bool {
     a.ranked_error() <= b.ranked_error()
 }
@@ -56,7 +52,9 @@ fn outclasses(a: &Candidate, b: &Candidate) -> bool {
 
 /// Indices of those that are on the front or would be, were ties in time broken in their favour.
 pub fn contenders(candidates: &[Candidate]) -> Vec<usize> {
-    let fit: Vec<usize> = (0..candidates.len()).filter(|&i| is_fit(&candidates[i])).collect();
+    let fit: Vec<usize> = (0..candidates.len())
+        .filter(|&i| candidates[i].eligible && candidates[i].error.is_finite())
+        .collect();
     let beaten = |i: usize| fit.iter().any(|&j| j != i && outclasses(&candidates[j], &candidates[i]));
     fit.iter().copied().filter(|&i| !beaten(i)).collect()
 }

@@ -96,7 +96,8 @@ impl Covers {
             let (least, most) = (a[3].min(b[3]).min(c[3]), a[3].max(b[3]).max(c[3]));
             // Where rays go as deep at all corners, and normals are nearly the same, they go no more than twice as deep
             // between them.
-            if area * turned < 0.0 && most <= 2.0 * least && turns_little(draw.mesh, *triangle) {
+            let bounded = most <= 2.0 * least && (most == 0.0 || turns_little(draw.mesh, *triangle));
+            if area * turned < 0.0 && bounded {
                 self.fill([a, b, c], a[2].max(b[2]).max(c[2]) * (1.0 + 2.0 * most));
             }
         }

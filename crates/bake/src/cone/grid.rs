@@ -76,6 +76,35 @@ struct Level {
 /// Nodes to look into: level, node, and the first site of its period.
 pub(super) type Stack = Vec<(usize, [usize; 2], [i64; 2])>;
 
+/// Puts the one node of the last level on the stack and, if the map is periodic, its images around it.
+#[inline(always)]
+pub(super) fn push_roots(stack: &mut Stack, level: usize, sites: [usize; 2], periodic: bool) {
+    let images = if periodic { -1..=1 } else { 0..=0 };
+    for y in images.clone() {
+        for x in images.clone() {
+            stack.push((level, [0, 0], [x * sites[0] as i64, y * sites[1] as i64]));
+        }
+    }
+}
+
+/// Puts the parts of a node on the stack; `nodes`: of the level below it.
+#[inline(always)]
+pub(super) fn push_children(
+    stack: &mut Stack,
+    level: usize,
+    node: [usize; 2],
+    origin: [i64; 2],
+    nodes: [usize; 2],
+) {
+    for b in [2 * node[1], 2 * node[1] + 1] {
+        for a in [2 * node[0], 2 * node[0] + 1] {
+            if a < nodes[0] && b < nodes[1] {
+                stack.push((level - 1, [a, b], origin));
+            }
+        }
+    }
+}
+
 /// See the module.
 pub(super) struct Grid<'a> {
     pub sites: [usize; 2],
@@ -240,26 +269,13 @@ impl<'a> Grid<'a> {
     /// The whole map and, if it is periodic, its images around it.
     #[inline(always)]
     pub fn roots(&self, stack: &mut Stack) {
-        let images = if self.periodic { -1..=1 } else { 0..=0 };
-        for y in images.clone() {
-            for x in images.clone() {
-                let origin = [x * self.sites[0] as i64, y * self.sites[1] as i64];
-                stack.push((self.levels.len() - 1, [0, 0], origin));
-            }
-        }
+        push_roots(stack, self.levels.len() - 1, self.sites, self.periodic);
     }
 
     /// The parts of a node.
     #[inline(always)]
     pub fn children(&self, level: usize, node: [usize; 2], origin: [i64; 2], stack: &mut Stack) {
-        let nodes = self.levels[level - 1].nodes;
-        for b in [2 * node[1], 2 * node[1] + 1] {
-            for a in [2 * node[0], 2 * node[0] + 1] {
-                if a < nodes[0] && b < nodes[1] {
-                    stack.push((level - 1, [a, b], origin));
-                }
-            }
-        }
+        push_children(stack, level, node, origin, self.levels[level - 1].nodes);
     }
 
     /// First and last site of a node of a level, on the map.

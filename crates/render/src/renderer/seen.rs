@@ -59,20 +59,17 @@ impl Renderer<'_> {
         if displaced || !self.request.skips.contains(Skips::OCCLUSION) || self.scene.draws.len() < 2 {
             return;
         }
-        let candidate = |(at, draw): (usize, &'_ Draw<'_>)| {
-            let stand = self.stands(at, camera, culling)?;
-            let outline = culling.outline(stand.relative_from_object.w_axis.truncate(), stand.radius)?;
-            Some((at, draw.triangles.clone(), stand, outline))
-        };
-        let found: Vec<_> = self.scene.draws.iter().enumerate().filter_map(candidate).collect();
-        let candidates: Vec<_> = found
-            .into_iter()
-            .map(|(at, triangles, stand, outline)| {
-                let Draw { mesh, material, .. } = &self.scene.draws[at];
+        let draws = self.scene.draws.iter().enumerate();
+        let candidates: Vec<_> = draws
+            .filter_map(|(at, draw)| {
+                let stand = self.stands(at, camera, culling)?;
+                let outline = culling.outline(stand.relative_from_object.w_axis.truncate(), stand.radius)?;
+                let Draw { mesh, material, triangles, .. } = draw;
                 let extent = material.field.extent();
                 let depth = if self.request.technique.displaces() { extent.scale * extent.base } else { 0.0 };
                 let middle = self.rooms.get(&address(mesh)).map_or(DVec3::ZERO, |room| room.middle);
-                Candidate { mesh, triangles, middle, stand, outline, depth: f64::from(depth) }
+                let triangles = triangles.clone();
+                Some(Candidate { mesh, triangles, middle, stand, outline, depth: f64::from(depth) })
             })
             .collect();
         culling.add_covers(&candidates);

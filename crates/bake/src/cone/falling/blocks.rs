@@ -3,7 +3,7 @@
 use heightfield::HeightField;
 use rayon::prelude::*;
 
-use super::super::grid::Stack;
+use super::super::grid::{Stack, push_children, push_roots};
 
 /// Lowest and highest point, and the least and greatest partial derivatives `dh/du`, `dh/dv` per UV unit.
 #[derive(Debug, Clone, Copy)]
@@ -102,25 +102,13 @@ impl Blocks {
     /// The whole map and, if it is periodic, its images around it.
     #[inline(always)]
     pub fn roots(&self, stack: &mut Stack) {
-        let images = if self.periodic { -1..=1 } else { 0..=0 };
-        for y in images.clone() {
-            for x in images.clone() {
-                stack.push((self.levels.len() - 1, [0, 0], [x * self.cells[0], y * self.cells[1]]));
-            }
-        }
+        push_roots(stack, self.levels.len() - 1, self.levels[0].size, self.periodic);
     }
 
     /// The parts of a block.
     #[inline(always)]
     pub fn children(&self, level: usize, node: [usize; 2], origin: [i64; 2], stack: &mut Stack) {
-        let size = self.levels[level - 1].size;
-        for b in [2 * node[1], 2 * node[1] + 1] {
-            for a in [2 * node[0], 2 * node[0] + 1] {
-                if a < size[0] && b < size[1] {
-                    stack.push((level - 1, [a, b], origin));
-                }
-            }
-        }
+        push_children(stack, level, node, origin, self.levels[level - 1].size);
     }
 
     /// Ranges of the surface over a rectangle, or wider ones. Positions count cells, from the first one on.

@@ -23,9 +23,8 @@ const PLACE_MARGIN: f64 = 1e-3;
 const MOST: usize = 16;
 /// Blocks of this level are looked at texel by texel.
 const LEAF: usize = 1;
-/// How often a ray, or those through a block, are looked at in vain before one by one.
-const TRIES_OF_TEXEL: u32 = 8;
-const TRIES_OF_BLOCK: u32 = 1;
+/// How often rays through one texel are looked at in vain before each is followed.
+const TRIES: u32 = 8;
 /// Samples of a row farther apart than this many texels are looked at one by one.
 const WIDEST: f64 = 16.0;
 
@@ -126,9 +125,6 @@ impl<'a, L: Lanes> Rays<'a, L> {
             return (lanes, 1);
         }
         let (lanes, last) = self.steep_samples(lanes, gap, block.height);
-        if last == 0 {
-            return (lanes, last);
-        }
         self.follow(block, lanes, last)
     }
 
@@ -162,14 +158,14 @@ impl<'a, L: Lanes> Rays<'a, L> {
     }
 
     /// Those of the lanes for which a ray through the block may come out up to sample `last`, and the first sample that
-    /// may be out. The samples are looked at all at once, or half of them and then the rest, and so on.
+    /// may be out. The samples are looked at all at once; those of rays through one texel then by halves, and so on.
     #[inline(always)]
     fn follow(&self, block: &Block, lanes: L::M, last: u32) -> (L::M, u32) {
         let tops = block.height.map(f64::from);
         let (mut from, mut to) = (1, last);
         // A block of one cell has the heights of all its corners.
         let alone = block.first == block.last && block.height[0] == block.height[1];
-        let mut tries = if alone { TRIES_OF_TEXEL } else { TRIES_OF_BLOCK };
+        let mut tries = TRIES;
         while from <= last {
             let between = [out(tops[0], from - 1), out(tops[1], to)];
             let surface = self.texels.blocks.over(self.places(block, between));
@@ -178,8 +174,11 @@ impl<'a, L: Lanes> Rays<'a, L> {
                 (from, to) = (to + 1, last);
                 continue;
             }
+            if !alone {
+                return (lanes, from);
+            }
             tries = tries.saturating_sub(1);
-            if from == to && alone && self.is_inside(block, from) {
+            if from == to && self.is_inside(block, from) {
                 (from, to) = (from + 1, last);
             } else if from == to || tries == 0 {
                 return (lanes, from);
