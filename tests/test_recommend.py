@@ -203,18 +203,32 @@ def test_values_are_in_the_units_of_engines(hills: bw.HeightMap) -> None:
     many = engine_settings("pom", {"steps": 200}, hills, "godot")
     assert not many.built_in
     assert any("at most 64 layers" in note for note in many.notes)
-    three = engine_settings("exact", {}, hills, "threejs")
-    assert three.values["displacementBias"] == pytest.approx(-0.015)
+    three = engine_settings("displacement", {}, hills, "threejs")
+    # Texel 0.25, the base, stays where it is.
+    assert three.built_in
+    assert three.values["displacementScale"] * 0.25 + three.values["displacementBias"] == pytest.approx(0.0)
+    own = engine_settings("exact", {}, hills, "threejs")
+    assert (own.built_in, own.values["uniforms.tileSize"]) == (False, [2.0, 1.0])
+    # Amplitude alone, in centimetres: pixel displacement has no base. Length goes along u.
     unity = engine_settings("pom", {"steps": 12}, hills, "unity_hdrp")
     assert unity.values["Amplitude (cm)"] == pytest.approx(6.0)
+    assert (unity.values["Primitive length"], unity.values["Primitive width"]) == (2.0, 1.0)
     assert "Maximum steps: 12" in str(unity)
+    assert "Base" not in unity.values
+    assert any("base is 0.25" in note for note in unity.notes)
+    cut = engine_settings("displacement", {}, hills, "unity_hdrp")
+    assert (cut.built_in, cut.values["Base"]) == (True, 0.25)
+    assert cut.values["Displacement Mode"] == "Tessellation displacement"
+    tiny = bw.HeightMap([[0.5]], tile_size=(0.001, 1.0))
+    small = engine_settings("pom", {"steps": 12}, tiny, "unity_hdrp")
+    assert any("below 0.01 m" in note for note in small.notes)
     with pytest.raises(ValueError, match="engine"):
         engine_settings("pom", {"steps": 48}, hills, "quake")
 
 
 def test_a_recommendation_speaks_for_engines(result: bw.CompareResult) -> None:
     advice = result.recommend(3.0, among=BUILT_IN["unity_hdrp"], max_failure_rate=1.0)
-    assert advice.settings("unity_hdrp").values["Base"] == 0.25
+    assert advice.settings("unity_hdrp").values["Displacement Mode"] == "Pixel displacement"
     nothing = result.recommend(0.0, verify=False, memory=1)
     for call in (nothing.object, nothing.shader, lambda: nothing.settings("bevy")):
         with pytest.raises(ValueError, match="nothing was recommended"):

@@ -229,7 +229,7 @@ class CompareResult:
         time : {"cpu", "device"} or None
             Whose time counts; None for the device's where there is one.
         among : iterable of str or None
-            Techniques that may be chosen, such as ``bumpwgpu.engines.BUILT_IN["godot"]``; None for all.
+            Techniques that may be chosen, such as ``bumpwgpu.engines.BUILT_IN["bevy"]``; None for all.
         verify : bool, default True
             Measure the pick again: on other rays and at angles between, or from cameras a little aside.
             One whose error could exceed the budget there is passed over for the next.

@@ -57,7 +57,7 @@ def compare(
         map as it is; times are those of 32-bit floats. None is 32-bit floats for named techniques.
     device : {"auto", "cpu", "gpu"}
         Whose time to take besides the CPU's. "auto" takes a Vulkan device if there is one. Scenes need
-        one.
+        one. The time of a software device is processor time, all its threads together.
     rays : int, default 8192
         Rays at each elevation of a height map, at most 2**20.
     repeats : int, default 5
@@ -133,8 +133,13 @@ def compare(
         "repeats": rounds,
         "seed": start,
     }
+    environment["time"] = "CPU: processor time of one thread"
     if problem is not None:
         environment["device"] = f"none ({problem})"
+    elif "(software)" in environment.get("device", ""):
+        environment["time"] += "; device: processor time, all its threads together"
+    elif device != "cpu":
+        environment["time"] += "; device: its own clock"
     return CompareResult(rows, "planar", environment, source, dropped=dropped)
 
 

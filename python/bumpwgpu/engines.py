@@ -1,4 +1,17 @@
-"""Technique and parameters in the words of engines' materials."""
+"""Technique and parameters in the words of engines' materials.
+
+Names, units and ranges are those of the engines' sources:
+
+* Bevy 0.16 and later: ``crates/bevy_pbr/src/parallax.rs`` and ``pbr_material.rs``; what is done with them,
+  ``render/parallax_mapping.wgsl`` there.
+* Godot 4: ``BaseMaterial3D`` in ``scene/resources/material.cpp``. Its shader multiplies ``heightmap_scale``
+  by 0.01; the editor's sliders end at 16 and at 64 layers.
+* three.js: ``src/materials/MeshStandardMaterial.js``; a vertex moves by
+  ``texel * displacementScale + displacementBias`` (``ShaderChunk/displacementmap_vertex.glsl.js``).
+* Unity HDRP: ``Editor/Material/UIBlocks/SurfaceOptionUIBlock.cs`` and ``LitSurfaceInputsUIBlock.cs`` of
+  com.unity.render-pipelines.high-definition. Pixel displacement has an amplitude in centimetres and no base:
+  its highest point always lies on the mesh. Steps are 1 to 64.
+"""
 
 from __future__ import annotations
 
@@ -16,11 +29,15 @@ ENGINES = ("bevy", "godot", "threejs", "unity_hdrp")
 BUILT_IN: dict[str, tuple[str, ...]] = {
     "bevy": ("pom", "relief"),
     "godot": ("parallax_limited",),
-    "threejs": (),
-    "unity_hdrp": ("pom",),
+    "threejs": ("displacement",),
+    "unity_hdrp": ("pom", "displacement"),
 }
 #: Most layers that the sliders of an engine reach.
 _MOST_LAYERS = {"godot": 64, "unity_hdrp": 64}
+#: End of HDRP's slider for the mip level from which pixel displacement fades out.
+_LAST_MIP = 16
+#: Least length and width of a primitive that HDRP's editor takes, metres.
+_LEAST_PRIMITIVE = 0.01
 
 
 class EngineSettings(NamedTuple):
@@ -158,40 +175,61 @@ def _godot(
 def _threejs(
     technique: str, parameters: dict[str, int], layers: int | None, height_map: HeightMap, built_in: bool
 ) -> tuple[dict[str, Any], list[str]]:
+    notes = ["set colorSpace = NoColorSpace on the height texture"]
+    if built_in:
+        # A vertex goes along its normal by displacementScale * texel + displacementBias.
+        values: dict[str, Any] = {
+            "displacementScale": height_map.scale,
+            "displacementBias": -height_map.scale * height_map.base,
+        }
+        return values, ["give the texture as displacementMap; the mesh must be as fine as the relief", *notes]
     values = {
-        "displacementScale": height_map.scale,
-        "displacementBias": -height_map.scale * height_map.base,
         "uniforms.scale": height_map.scale,
         "uniforms.base": height_map.base,
         "uniforms.tileSize": list(height_map.tile_size),
     }
-    notes = [
-        "displacementScale and displacementBias move vertices: the same surface, at the cost of a fine mesh",
-        "set colorSpace = NoColorSpace on the height texture",
-    ]
+    notes.append(
+        "these are for a ShaderMaterial of one's own; three.js' materials know displacementMap alone"
+    )
     return values, notes
 
 
 def _unity(
     technique: str, parameters: dict[str, int], layers: int | None, height_map: HeightMap, built_in: bool
 ) -> tuple[dict[str, Any], list[str]]:
-    values: dict[str, Any] = {
-        "Displacement Mode": "Pixel displacement" if built_in else "None",
-        "Parametrization": "Amplitude",
-        "Amplitude (cm)": 100.0 * height_map.scale,
-        "Base": height_map.base,
-        "Primitive length (m)": height_map.tile_size[1],
-        "Primitive width (m)": height_map.tile_size[0],
-    }
-    if built_in:
-        values["Minimum steps"] = layers
-        values["Maximum steps"] = layers
     notes = [
         "mesh units are taken for metres",
         "turn sRGB off in the import settings of the height texture; single channel, 16 bits",
-        "primitive sizes are those of the mesh that one tile covers",
     ]
-    return values, notes
+    amplitude = 100.0 * height_map.scale
+    if technique == "displacement":
+        values: dict[str, Any] = {
+            "Displacement Mode": "Tessellation displacement",
+            "Parametrization": "Amplitude",
+            "Amplitude (cm)": amplitude,
+            "Base": height_map.base,
+            "Offset": 0.0,
+        }
+        return values, [*notes, "it is the shader HDRP/LitTessellation that has this mode"]
+    if not built_in:
+        return {"Displacement Mode": "None"}, notes
+    across, along = height_map.tile_size
+    values = {
+        "Displacement Mode": "Pixel displacement",
+        "Minimum steps": layers,
+        "Maximum steps": layers,
+        "Fading mip level start": _LAST_MIP,
+        "Primitive length": across,
+        "Primitive width": along,
+        "Amplitude (cm)": amplitude,
+    }
+    notes.append(
+        "primitive sizes are those of the mesh that UV 0 to 1 covers, length along u and width along v"
+    )
+    notes.append("what was measured reads the finest mip: a lower fading level flattens the relief far away")
+    if min(across, along) < _LEAST_PRIMITIVE:
+        notes.append(f"primitive sizes below {_LEAST_PRIMITIVE:g} m are not taken; scale the mesh up")
+    return values, [*notes, *_base_note(height_map, 1.0, "HDRP's pixel displacement")]
 
 
 _MATERIALS = {"bevy": _bevy, "godot": _godot, "threejs": _threejs, "unity_hdrp": _unity}

@@ -11,7 +11,7 @@ use crate::layouts::MaterialMaps;
 use crate::pipeline::{Pipeline, PipelineKey, constants_of};
 use crate::request::Program;
 use crate::targets::TargetSet;
-use crate::timer::Timer;
+use crate::timer::{Stopwatch, Timer};
 use crate::uniforms::{MarchResult, MarchSegment};
 use crate::{Device, RenderError};
 
@@ -24,8 +24,9 @@ const WORKGROUP: u32 = 64;
 pub struct DeviceHits {
     /// All results, as `heightfield::march` returns them.
     pub hits: Hits,
-    /// Time on the device's clock, or of the submissions where it has none. Some drivers compile a
-    /// program when it first runs, so the first call with a technique may take longer.
+    /// Time on the device's clock, or of the submissions where it has none: for a software device processor
+    /// time, all threads together. Some drivers compile a program when it first runs, so the first call with a
+    /// technique may take longer.
     pub device_seconds: f64,
 }
 
@@ -219,7 +220,7 @@ fn dispatch(
         // The upload is not part of the time.
         device.queue.submit([]);
         device.wait("marching")?;
-        let before = std::time::Instant::now();
+        let stopwatch = Stopwatch::start(device);
         let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
@@ -243,7 +244,7 @@ fn dispatch(
         device.wait("marching")?;
         let seconds = match &timer {
             Some(timer) => timer.read_ms(device)? * 1e-3,
-            None => before.elapsed().as_secs_f64(),
+            None => stopwatch.seconds(),
         };
         let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         encoder.copy_buffer_to_buffer(&output, 0, &readback, 0, result_bytes);

@@ -1,6 +1,44 @@
-//! Time on the device's own clock.
+//! Time on the device's own clock, or on this process' where the device is software.
+
+use std::time::Instant;
 
 use crate::{Device, RenderError};
+
+/// The host's time for a submission, where the device has no clock of its own.
+///
+/// Software devices run on threads of this process, so theirs is its processor time, all threads together: other
+/// programs, which take cores away for a while, and the number of cores do not count.
+pub(crate) struct Stopwatch {
+    start: Instant,
+    worked: Option<f64>,
+}
+
+impl Stopwatch {
+    /// Begins now. Nothing else should be at work in this process until the end.
+    pub fn start(device: &Device) -> Self {
+        let worked = (device.info().kind == "software").then(processor_seconds).flatten();
+        Self { start: Instant::now(), worked }
+    }
+
+    /// Seconds since the start.
+    pub fn seconds(&self) -> f64 {
+        match (self.worked, processor_seconds()) {
+            (Some(before), Some(now)) => now - before,
+            _ => self.start.elapsed().as_secs_f64(),
+        }
+    }
+}
+
+/// Processor time of this process so far, where the system tells.
+fn processor_seconds() -> Option<f64> {
+    #[cfg(unix)]
+    {
+        let now = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+        Some(now.tv_sec as f64 + 1e-9 * now.tv_nsec as f64)
+    }
+    #[cfg(not(unix))]
+    None
+}
 
 /// Two timestamps around a pass.
 pub(crate) struct Timer {
