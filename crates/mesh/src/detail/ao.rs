@@ -44,7 +44,7 @@ impl Sky {
     /// `rays` directions, looking `distance` far into `surface`.
     pub(super) fn new(surface: &Surface<'_>, rays: u32, distance: Option<f32>, seed: u64) -> Self {
         let bounds = surface.tree.bounds();
-        let size = Vec3::from(bounds.high) - Vec3::from(bounds.low);
+        let size = Vec3::from(bounds.high - bounds.low);
         let directions = (0..rays)
             .map(|i| {
                 let share = (i as f32 + 0.5) / rays as f32;
@@ -53,7 +53,7 @@ impl Sky {
                 Vec3::new(radius * cos, radius * sin, (1.0 - share).sqrt())
             })
             .collect();
-        let reach = bounds.low.iter().chain(&bounds.high).fold(0.0, |m: f32, x| m.max(x.abs()));
+        let reach = surface.tree.reach();
         Self { directions, distance: distance.unwrap_or(size.length() * 1.01), lift: reach * LIFT, seed }
     }
 

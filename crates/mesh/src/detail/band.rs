@@ -277,17 +277,16 @@ impl Job<'_> {
         tally.met = (tally.met.0.min(height), tally.met.1.max(height));
         sum.met += 1;
         sum.height += height;
-        if !self.options.normal && self.sky.is_none() {
-            return;
-        }
-        let point = self.surface.point(hit, Vec3::from(sample.ray.direction));
+        let direction = Vec3::from(sample.ray.direction);
         if self.options.normal {
+            let normal = self.surface.normal(hit, direction);
             sum.normal += match self.options.space {
-                NormalSpace::Object => point.normal,
-                NormalSpace::Tangent => sample.spot.tangent_space(point.normal),
+                NormalSpace::Object => normal,
+                NormalSpace::Tangent => sample.spot.tangent_space(normal),
             };
         }
         if let Some(sky) = &self.sky {
+            let point = self.surface.point(hit, direction);
             sum.open += sky.open(&self.surface, &point, sample.number, &mut scratch.stack);
         }
     }

@@ -72,8 +72,10 @@ pub fn bake_detail(
     }
     let DetailOptions { width, height, grid, .. } = *options;
     let texels = width * height;
+    let up = [0.0, 0.0, if options.space == NormalSpace::Tangent { 1.0 } else { 0.0 }];
     let mut covered = place_for(texels, false)?;
-    let mut normal = options.normal.then(|| place_for(texels * 3, 0.0_f32)).transpose()?;
+    let normal: Option<Vec<[f32; 3]>> = options.normal.then(|| place_for(texels, up)).transpose()?;
+    let mut normal = normal.map(Vec::into_flattened);
     let mut heights = options.heights.then(|| place_for(texels, 0.0_f32)).transpose()?;
     let mut ao = options.sky.map(|_| place_for(texels, 1.0_f32)).transpose()?;
 
@@ -86,11 +88,6 @@ pub fn bake_detail(
 
     if let Some(heights) = &mut heights {
         heights.fill(ground.unit(0.0));
-    }
-    if let Some(normal) = &mut normal
-        && options.space == NormalSpace::Tangent
-    {
-        normal.chunks_exact_mut(3).for_each(|n| n[2] = 1.0);
     }
     let mut tally = Tally::NOTHING;
     let bands = split(width * band_rows(grid), &mut covered, &mut normal, &mut heights, &mut ao);
@@ -191,11 +188,12 @@ fn check_coordinates(name: &str, mesh: &Mesh) -> Result<(), MeshError> {
 }
 
 /// Memory for a map, or the number of bytes that could not be had.
-fn place_for<T: Clone>(count: usize, value: T) -> Result<Vec<T>, MeshError> {
+fn place_for<T: Clone + Send>(count: usize, value: T) -> Result<Vec<T>, MeshError> {
     let mut place = Vec::new();
     place
         .try_reserve_exact(count)
         .map_err(|_| MeshError::NoMemory { what: "the map", bytes: count as u64 * size_of::<T>() as u64 })?;
-    place.resize(count, value);
+    // By all threads: most of the time goes into the first touch of each page.
+    place.par_extend(rayon::iter::repeat_n(value, count).with_min_len(1 << 16));
     Ok(place)
 }

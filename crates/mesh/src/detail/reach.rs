@@ -22,7 +22,7 @@ pub(super) fn measured(
     detail: &Surface<'_>,
     go_on: impl FnMut() -> bool,
 ) -> Option<(f32, f32)> {
-    let corners = |t: u32| plain.indices[t as usize].map(|i| plain.positions[i as usize].to_array());
+    let corners = |t: u32| plain.indices[t as usize].map(|i| plain.positions[i as usize]);
     let tree = Tree::new(plain.indices.len(), corners, go_on)?;
     let triangles = &detail.mesh.indices;
     let step = triangles.len().div_ceil(MEASURED / 2);

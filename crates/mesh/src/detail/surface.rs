@@ -25,26 +25,42 @@ pub(super) struct Point {
 impl<'a> Surface<'a> {
     /// The surface of a mesh; `None` when `go_on` said no.
     pub(super) fn new(mesh: &'a Mesh, go_on: impl FnMut() -> bool) -> Option<Self> {
-        let corners = |t: u32| mesh.indices[t as usize].map(|i| mesh.positions[i as usize].to_array());
+        let corners = |t: u32| mesh.indices[t as usize].map(|i| mesh.positions[i as usize]);
         Tree::new(mesh.indices.len(), corners, go_on).map(|tree| Self { mesh, tree })
     }
 
-    /// Where a ray of that direction met the surface. A side seen from behind is turned over.
+    /// The interpolated normal where a ray of that direction met the surface, unit. A side seen from
+    /// behind is turned over.
+    #[inline(always)]
+    pub(super) fn normal(&self, hit: &Hit, direction: Vec3) -> Vec3 {
+        let plane = self.plane(hit);
+        let normal =
+            self.mix(hit, &self.mesh.normals).try_normalize().unwrap_or_else(|| plane.normalize_or_zero());
+        if plane.dot(direction) > 0.0 { -normal } else { normal }
+    }
+
+    /// Where a ray of that direction met the surface.
     #[inline(always)]
     pub(super) fn point(&self, hit: &Hit, direction: Vec3) -> Point {
-        let corners = self.mesh.indices[hit.triangle as usize].map(|i| i as usize);
+        let plane = self.plane(hit).normalize_or_zero();
+        Point {
+            place: self.mix(hit, &self.mesh.positions),
+            normal: self.normal(hit, direction),
+            plane: if plane.dot(direction) > 0.0 { -plane } else { plane },
+        }
+    }
+
+    /// The triangle's own normal, as long as twice its area.
+    #[inline(always)]
+    fn plane(&self, hit: &Hit) -> Vec3 {
+        let [a, b, c] = self.mesh.indices[hit.triangle as usize].map(|i| self.mesh.positions[i as usize]);
+        (b - a).cross(c - a)
+    }
+
+    #[inline(always)]
+    fn mix(&self, hit: &Hit, values: &[Vec3]) -> Vec3 {
+        let [a, b, c] = self.mesh.indices[hit.triangle as usize].map(|i| values[i as usize]);
         let [wa, wb, wc] = hit.weights;
-        let mix = |v: &[Vec3]| v[corners[0]] * wa + v[corners[1]] * wb + v[corners[2]] * wc;
-        let [a, b, c] = corners.map(|i| self.mesh.positions[i]);
-        let mut plane = (b - a).cross(c - a).normalize_or_zero();
-        let behind = plane.dot(direction) > 0.0;
-        if behind {
-            plane = -plane;
-        }
-        let mut normal = mix(&self.mesh.normals).try_normalize().unwrap_or(plane);
-        if behind {
-            normal = -normal;
-        }
-        Point { place: mix(&self.mesh.positions), normal, plane }
+        a * wa + b * wb + c * wc
     }
 }

@@ -42,11 +42,10 @@ impl Beam {
         let mut bounds = EMPTY;
         let mut low = [f32::INFINITY; 3];
         let mut high = [f32::NEG_INFINITY; 3];
-        let mut largest = reach;
         for ray in rays {
             let (o, d) = (Vec3::from(ray.origin), Vec3::from(ray.direction));
             for p in [o + d * ray.start, o + d * ray.end] {
-                bounds = bounds.with(p.to_array());
+                bounds = bounds.with(p.into());
                 for (k, axis) in axes.iter().enumerate() {
                     let x = axis.dot(p);
                     low[k] = if x < low[k] { x } else { low[k] };
@@ -54,12 +53,9 @@ impl Beam {
                 }
             }
         }
-        for k in 0..3 {
-            largest = largest.max(bounds.low[k].abs()).max(bounds.high[k].abs());
-        }
-        let slack = largest * SLACK;
+        let slack = reach.max(bounds.low.abs().max(bounds.high.abs()).max_element()) * SLACK;
         Self {
-            bounds: Bounds { low: bounds.low.map(|x| x - slack), high: bounds.high.map(|x| x + slack) },
+            bounds: Bounds { low: bounds.low - slack, high: bounds.high + slack },
             slabs: std::array::from_fn(|k| Slab {
                 axis: axes[k].to_array(),
                 low: low[k] - slack,
@@ -177,8 +173,7 @@ impl Tree {
         if rays.is_empty() || self.leaves.is_empty() {
             return;
         }
-        let reach = self.bounds.low.iter().chain(&self.bounds.high).fold(0.0, |m: f32, x| m.max(x.abs()));
-        let beam = Beam::around(rays, reach);
+        let beam = Beam::around(rays, self.reach());
         let Scratch { open, leaves, octets, .. } = scratch;
         open.clear();
         leaves.clear();

@@ -4,6 +4,8 @@
 //! triangles with a common edge compute the same number for it but for the sign, so no ray slips
 //! between them. Source: Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2013.
 
+use glam::Vec3;
+
 use super::ray::{Hit, Ray, Sides};
 use super::{Bounds, EMPTY, LANES};
 
@@ -27,7 +29,7 @@ impl Leaf {
     /// The leaf of some triangles, and the box around it.
     pub(super) fn new(
         triangles: impl Iterator<Item = u32>,
-        corners_of: impl Fn(u32) -> [[f32; 3]; 3],
+        corners_of: impl Fn(u32) -> [Vec3; 3],
     ) -> (Self, Bounds) {
         let mut leaf = Self { corners: [[[f32::NAN; LANES]; 3]; 3], triangles: [u32::MAX; LANES] };
         let mut bounds = EMPTY;
@@ -35,18 +37,18 @@ impl Leaf {
             let corners = corners_of(triangle);
             leaf.triangles[lane] = triangle;
             for (corner, place) in corners.iter().enumerate() {
-                for axis in 0..3 {
-                    leaf.corners[corner][axis][lane] = place[axis];
+                for (axis, x) in place.to_array().into_iter().enumerate() {
+                    leaf.corners[corner][axis][lane] = x;
                 }
-                bounds = bounds.with(*place);
+                bounds = bounds.with((*place).into());
             }
         }
         (leaf, bounds)
     }
 
     /// The triangles with their corners.
-    pub(super) fn triangles(&self) -> impl Iterator<Item = (u32, [[f32; 3]; 3])> {
-        let corner = |lane: usize, c: usize| [0, 1, 2].map(|axis| self.corners[c][axis][lane]);
+    pub(super) fn triangles(&self) -> impl Iterator<Item = (u32, [Vec3; 3])> {
+        let corner = |lane: usize, c: usize| Vec3::from([0, 1, 2].map(|axis| self.corners[c][axis][lane]));
         let lanes = self.triangles.iter().enumerate().filter(|(_, t)| **t != u32::MAX);
         lanes.map(move |(lane, &t)| (t, [0, 1, 2].map(|c| corner(lane, c))))
     }
@@ -54,7 +56,7 @@ impl Leaf {
     /// The nearest triangle that the ray meets before `ray.end`; shortens the ray.
     #[inline(always)]
     pub(super) fn hit(&self, ray: &mut Ray, sides: Sides) -> Option<Hit> {
-        let [kx, ky, kz] = ray.axes;
+        let [kx, ky, kz] = ray.axes();
         let [sx, sy, sz] = ray.shear;
         let (ox, oy, oz) = (ray.origin[kx], ray.origin[ky], ray.origin[kz]);
         let mut x = [[0.0; LANES]; 3];
@@ -84,7 +86,7 @@ impl Leaf {
             let (low, high) = (least(least(u, v), w), -least(least(-u, -v), -w));
             let inside = match sides {
                 Sides::Both => -least(-low, high),
-                Sides::Front if ray.mirrored => -high,
+                Sides::Front if ray.is_mirrored() => -high,
                 Sides::Front => low,
             };
             // A triangle without area has a depth of NaN, which is between no bounds.
@@ -92,11 +94,16 @@ impl Leaf {
             let met = if met >= ray.start { met } else { f32::INFINITY };
             t[i] = if met <= ray.end { met } else { f32::INFINITY };
         }
-        let nearest = t.iter().fold(f32::INFINITY, |a, &b| least(a, b));
-        if nearest == f32::INFINITY {
+        let mut nearest = t;
+        for half in [LANES / 2, LANES / 4, LANES / 8] {
+            for i in 0..half {
+                nearest[i] = least(nearest[i], nearest[i + half]);
+            }
+        }
+        if nearest[0] == f32::INFINITY {
             return None;
         }
-        let best = t.iter().position(|&t| t == nearest).unwrap_or(0);
+        let best = t.iter().position(|&t| t == nearest[0]).unwrap_or(0);
         ray.end = t[best];
         let w = [0, 1, 2].map(|c| weights[c][best]);
         let sum = w[0] + w[1] + w[2];

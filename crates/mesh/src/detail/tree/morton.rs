@@ -1,5 +1,6 @@
 //! Triangles along a Morton curve.
 
+use glam::{Vec3, Vec3A};
 use rayon::prelude::*;
 
 use super::{Bounds, EMPTY};
@@ -21,7 +22,7 @@ const FINE: f64 = (1u64 << 20) as f64;
 
 impl Cells {
     fn new(bounds: Bounds) -> Self {
-        let low = bounds.low.map(f64::from);
+        let low = bounds.low.to_array().map(f64::from);
         let longest =
             (0..3).map(|k| f64::from(bounds.high[k]) - low[k]).fold(0.0, |a: f64, side| a.max(side));
         Self { low, density: if longest > 0.0 { FINE / longest } else { 0.0 } }
@@ -29,7 +30,7 @@ impl Cells {
 
     /// 60 bits, x in the highest.
     #[inline(always)]
-    fn code(&self, p: [f32; 3]) -> u64 {
+    fn code(&self, p: Vec3) -> u64 {
         let cell = |k: usize| ((f64::from(p[k]) - self.low[k]) * self.density).clamp(0.0, FINE - 1.0) as u64;
         spread(cell(0)) << 2 | spread(cell(1)) << 1 | spread(cell(2))
     }
@@ -47,20 +48,14 @@ fn spread(x: u64) -> u64 {
 
 /// The triangles in the order of their centres along the curve, each with the first half of its code
 /// in the high word and its index in the low one.
-pub(super) fn order(triangles: usize, bounds_of: impl Fn(usize) -> Bounds + Sync) -> Vec<u64> {
-    let centres: Vec<[f32; 3]> = (0..triangles)
-        .into_par_iter()
-        .with_min_len(1 << 14)
-        .map(|i| {
-            let b = bounds_of(i);
-            std::array::from_fn(|k| 0.5 * b.low[k] + 0.5 * b.high[k])
-        })
-        .collect();
+pub(super) fn order(triangles: usize, centre_of: impl Fn(usize) -> Vec3A + Sync) -> Vec<u64> {
+    let centres: Vec<Vec3> =
+        (0..triangles).into_par_iter().with_min_len(1 << 14).map(|i| centre_of(i).into()).collect();
     let centre = |i: usize| centres[i];
     let around = centres
         .par_iter()
         .with_min_len(1 << 14)
-        .fold(|| EMPTY, |b, &p| b.with(p))
+        .fold(|| EMPTY, |b, &p| b.with(p.into()))
         .reduce(|| EMPTY, Bounds::union);
     let cells = Cells::new(around);
     let mut keys: Vec<u64> = (0..triangles)
@@ -116,12 +111,13 @@ mod tests {
     fn the_order_is_that_of_a_comparison_sort() {
         let point = |i: usize| {
             let x = |k: u32| (i as u32).wrapping_mul(2_654_435_761).rotate_left(k) as f32 / 4e9;
-            [x(0), x(9), if i.is_multiple_of(3) { 0.5 } else { x(20) }]
+            Vec3A::new(x(0), x(9), if i.is_multiple_of(3) { 0.5 } else { x(20) })
         };
-        let found = order(5000, |i| EMPTY.with(point(i)));
+        let found = order(5000, point);
         let around = (0..5000).fold(EMPTY, |b, i| b.with(point(i)));
         let cells = Cells::new(around);
-        let codes: Vec<u64> = found.iter().map(|&k| cells.code(point(k as u32 as usize)) >> 30).collect();
+        let codes: Vec<u64> =
+            found.iter().map(|&k| cells.code(point(k as u32 as usize).into()) >> 30).collect();
         assert!(codes.is_sorted());
         let mut seen: Vec<u32> = found.iter().map(|&k| k as u32).collect();
         seen.sort_unstable();
@@ -130,11 +126,11 @@ mod tests {
 
     #[test]
     fn points_in_one_place_and_points_of_one_cell_are_sorted_too() {
-        let one = order(100, |_| EMPTY.with([2.0; 3]));
+        let one = order(100, |_| Vec3A::splat(2.0));
         assert_eq!(one.len(), 100);
         // One far point squeezes the rest into one cell of the first half of the code.
         let x = |i: usize| if i == 99 { 1.0 } else { ((i * 37) % 99) as f32 * 1e-6 };
-        let squeezed = order(100, |i| EMPTY.with([x(i), 0.0, 0.0]));
+        let squeezed = order(100, |i| Vec3A::new(x(i), 0.0, 0.0));
         let places: Vec<f32> = squeezed.iter().map(|&k| x(k as u32 as usize)).collect();
         assert!(places.is_sorted(), "{places:?}");
     }

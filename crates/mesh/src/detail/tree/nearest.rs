@@ -29,7 +29,6 @@ impl Tree {
             }
             if at & LEAF != 0 {
                 for (triangle, corners) in self.leaves[(at & !LEAF) as usize].triangles() {
-                    let corners = corners.map(Vec3::from);
                     let weights = nearest_weights(p, corners);
                     let [a, b, c] = corners;
                     let place = a * weights[0] + b * weights[1] + c * weights[2];

@@ -34,12 +34,10 @@ pub(crate) struct Ray {
     pub end: f32,
     /// Inverse direction, finite.
     pub(super) inverse: [f32; 3],
-    /// The axes with the longest part of the direction last.
-    pub(super) axes: [usize; 3],
+    /// See [`Ray::axes`].
+    axes: [u8; 3],
     /// Takes the ray onto the last axis.
     pub(super) shear: [f32; 3],
-    /// Whether front faces, sheared, have negative edge functions.
-    pub(super) mirrored: bool,
 }
 
 impl Ray {
@@ -65,9 +63,20 @@ impl Ray {
             start,
             end,
             inverse,
-            axes,
+            axes: axes.map(|axis| axis as u8),
             shear,
-            mirrored: depth < 0.0,
         }
+    }
+
+    /// The axes with the longest part of the direction last.
+    #[inline(always)]
+    pub(super) fn axes(&self) -> [usize; 3] {
+        self.axes.map(usize::from)
+    }
+
+    /// Whether front faces, sheared, have negative edge functions.
+    #[inline(always)]
+    pub(super) fn is_mirrored(&self) -> bool {
+        self.shear[2] < 0.0
     }
 }

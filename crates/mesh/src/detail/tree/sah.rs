@@ -1,5 +1,7 @@
 //! Where to cut a set of boxes in two.
 
+use glam::Vec3A;
+
 use super::{Bounds, EMPTY};
 
 /// Cuts tried along each axis, and one more.
@@ -14,10 +16,10 @@ pub(super) struct Item {
 }
 
 impl Item {
-    /// Twice the centre along an axis.
+    /// Twice the centre.
     #[inline(always)]
-    fn middle(&self, axis: usize) -> f32 {
-        self.bounds.low[axis] + self.bounds.high[axis]
+    fn middle(&self) -> Vec3A {
+        self.bounds.low + self.bounds.high
     }
 }
 
@@ -26,23 +28,22 @@ pub(super) fn around(items: &[Item]) -> Bounds {
     items.iter().fold(EMPTY, |b, item| b.union(item.bounds))
 }
 
-/// Puts the items in two parts, and says where the second begins: never at either end.
+/// Puts at least two items in two parts, and says where the second begins, never at either end, and
+/// the boxes around both.
 ///
 /// The parts have the least sum of area times number among the cuts tried. `balanced` asks for
 /// halves instead, as do items whose centres agree.
-pub(super) fn cut(items: &mut [Item], balanced: bool) -> usize {
-    let half = items.len() / 2;
+pub(super) fn cut(items: &mut [Item], balanced: bool) -> (usize, [Bounds; 2]) {
     if balanced || items.len() < 3 {
         return halve(items);
     }
-    let middles = items.iter().fold(EMPTY, |b, item| b.with([0, 1, 2].map(|k| item.middle(k))));
-    let sides: [f32; 3] = std::array::from_fn(|k| middles.high[k] - middles.low[k]);
-    let axis = (0..3).fold(0, |best, k| if sides[k] > sides[best] { k } else { best });
-    let scale = BINS as f32 * (1.0 - 1e-6) / sides[axis];
+    let (middles, axis) = middles(items);
+    let scale = BINS as f32 * (1.0 - 1e-6) / (middles.high[axis] - middles.low[axis]);
     if !(scale.is_finite() && scale > 0.0) {
-        return half;
+        return parted(items, items.len() / 2);
     }
-    let bin = |item: &Item| (((item.middle(axis) - middles.low[axis]) * scale) as usize).min(BINS - 1);
+    let first = middles.low[axis];
+    let bin = |item: &Item| (((item.middle()[axis] - first) * scale) as usize).min(BINS - 1);
     let mut boxes = [EMPTY; BINS];
     let mut counts = [0usize; BINS];
     for item in items.iter() {
@@ -50,40 +51,50 @@ pub(super) fn cut(items: &mut [Item], balanced: bool) -> usize {
         boxes[at] = boxes[at].union(item.bounds);
         counts[at] += 1;
     }
-    let mut right = [0.0; BINS];
+    let mut right = [(EMPTY, 0.0); BINS];
     let (mut b, mut n) = (EMPTY, 0);
     for at in (1..BINS).rev() {
         (b, n) = (b.union(boxes[at]), n + counts[at]);
-        right[at] = b.half_area() * n as f32;
+        right[at] = (b, b.half_area() * n as f32);
     }
     let (mut b, mut n) = (EMPTY, 0);
-    let mut best = (f32::INFINITY, 0);
+    let mut best = (f32::INFINITY, 0, EMPTY);
     for at in 1..BINS {
         (b, n) = (b.union(boxes[at - 1]), n + counts[at - 1]);
-        let cost = b.half_area() * n as f32 + right[at];
+        let cost = b.half_area() * n as f32 + right[at].1;
         if n > 0 && n < items.len() && cost < best.0 {
-            best = (cost, at);
+            best = (cost, at, b);
         }
     }
-    if best.1 == 0 {
+    let (_, at, left) = best;
+    if at == 0 {
         return halve(items);
     }
     let mut split = 0;
-    for at in 0..items.len() {
-        if bin(&items[at]) < best.1 {
-            items.swap(at, split);
+    for i in 0..items.len() {
+        if bin(&items[i]) < at {
+            items.swap(i, split);
             split += 1;
         }
     }
-    split
+    (split, [left, right[at].0])
+}
+
+/// The box of the centres, twice as large, and its longest side.
+fn middles(items: &[Item]) -> (Bounds, usize) {
+    let middles = items.iter().fold(EMPTY, |b, item| b.with(item.middle()));
+    let sides = middles.high - middles.low;
+    (middles, (0..3).fold(0, |best, k| if sides[k] > sides[best] { k } else { best }))
 }
 
 /// Halves along the longest side of the centres' box.
-fn halve(items: &mut [Item]) -> usize {
+fn halve(items: &mut [Item]) -> (usize, [Bounds; 2]) {
     let half = items.len() / 2;
-    let middles = items.iter().fold(EMPTY, |b, item| b.with([0, 1, 2].map(|k| item.middle(k))));
-    let side = |k: usize| middles.high[k] - middles.low[k];
-    let axis = (0..3).fold(0, |best, k| if side(k) > side(best) { k } else { best });
-    items.select_nth_unstable_by(half, |a, b| a.middle(axis).total_cmp(&b.middle(axis)));
-    half
+    let (_, axis) = middles(items);
+    items.select_nth_unstable_by(half, |a, b| a.middle()[axis].total_cmp(&b.middle()[axis]));
+    parted(items, half)
+}
+
+fn parted(items: &[Item], at: usize) -> (usize, [Bounds; 2]) {
+    (at, [around(&items[..at]), around(&items[at..])])
 }

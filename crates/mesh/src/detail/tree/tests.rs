@@ -21,7 +21,7 @@ impl Random {
 }
 
 fn tree(soup: &Soup) -> Tree {
-    Tree::new(soup.len(), |i| soup[i as usize], || true).unwrap()
+    Tree::new(soup.len(), |i| soup[i as usize].map(Vec3::from), || true).unwrap()
 }
 
 fn soup(count: usize, size: f32, random: &mut Random) -> Soup {
@@ -112,7 +112,8 @@ fn compare(soup: &Soup, tree: &Tree, rays: &[Ray], sides: Sides) -> usize {
 fn bundles_find_what_brute_force_finds() {
     let mut random = Random(1);
     let mut hits = 0;
-    for (count, size) in [(1, 0.5), (7, 0.5), (9, 0.3), (300, 0.1), (2000, 0.05), (400, 1.0)] {
+    for (count, size) in [(1, 0.5), (7, 0.5), (9, 0.3), (300, 0.1), (2000, 0.05), (400, 1.0), (20_000, 0.03)]
+    {
         let soup = soup(count, size, &mut random);
         let tree = tree(&soup);
         for bundle in 0..12 {
@@ -244,7 +245,7 @@ fn building_stops_when_told() {
         let mut asked = 0;
         let built = Tree::new(
             soup.len(),
-            |i| soup[i as usize],
+            |i| soup[i as usize].map(Vec3::from),
             || {
                 asked += 1;
                 asked <= after
