@@ -21,11 +21,11 @@ from bumpwgpu import _bumpwgpu
 FILES: dict[str, dict[str, Any]] = {
     "ambientcg/rock058/displacement.jpg": {},
     "ambientcg/facade005/displacement.jpg": {"scale": 0.03},
-    "ogre/Bricks076C_normheight.dds": {"channel": "alpha"},
+    "ogre/Bricks076C_normheight.dds": {"channel": 3},
     "godot/texture_bricks_depth.jpg": {"invert": True, "scale": 0.05},
     "godot/texture_cheese_depth.png": {"invert": True},
     "godot/texture_rock_depth.png": {"invert": True, "wrap": "mirror"},
-    "terrain3d/rock023_alb_ht.png": {"channel": "alpha", "scale": 0.04},
+    "terrain3d/rock023_alb_ht.png": {"channel": 3, "scale": 0.04},
     "terrain3d/terrain2.exr": {"scale": 0.2},
     "panda3d/layingrock-h.jpg": {"invert": True},
     "panda3d/heightfield.png": {"wrap": "clamp"},
@@ -44,6 +44,9 @@ BUDGETS = (
     (2.0, 0.3, None),
     (8.0, 0.2, 0.3),
 )
+#: Searches that promise nothing: their errors are near the budget. Some of their rays may fail.
+LOOSE = ("steep", "steep_linear", "relief", "pom", "interval")
+LOOSE_FAILING = 0.05
 RAYS = 6000
 
 
@@ -104,8 +107,8 @@ def stored(height_map: bw.HeightMap, texels: str) -> bw.HeightMap:
 
 def measured(
     height_map: bw.HeightMap, advice: bw.Recommendation, rays: Rays, device: Any
-) -> tuple[float, float]:
-    """99th percentile of the error in texels, and share of rays without a right hit."""
+) -> tuple[NDArray[np.float64], float]:
+    """Errors of the rays that hit, texels, and the share of rays without a right hit."""
     assert advice.heights_format is not None
     copy = stored(height_map, advice.heights_format)
     hits = bw.march(copy, rays.origins, rays.directions, advice.object(), device=device)
@@ -122,7 +125,27 @@ def measured(
     error = np.abs(np.where(found, reported, 0.0) - true) * rays.texels
     short = found & (gap > 0.01) & (error > 1.0) & (reported < true)
     missed = found & (reported > true) & (skipped > 1e-4)
-    return float(np.quantile(error[found], 0.99)), float((~found | short | missed).mean())
+    return error[found], float((~found | short | missed).mean())
+
+
+def check(
+    advice: bw.Recommendation, height_map: bw.HeightMap, rays: Rays, device: Any, budget: float
+) -> None:
+    """Holds a recommendation to rays of no comparison."""
+    assert advice.bound_p99_texels is not None
+    assert advice.bound_failure_rate is not None
+    assert advice.bound_p99_texels <= budget
+    if advice.cones_format not in (None, "r32float"):
+        return  # march() has no cones in other formats
+    errors, failing = measured(height_map, advice, rays, device)
+    said = f"{height_map!r} on {device}, {budget:g} texels: {advice.reason}"
+    print(f"{said}\n    unseen: p99 {np.quantile(errors, 0.99):.4g} texels, {100 * failing:.3g} % failing")
+    # No more rays beyond the budget than 1 %, nor failing than the bound, but for chance (three deviations).
+    for share, bound in (
+        ((errors > max(budget, 1e-3)).mean(), 0.01),
+        (failing, max(advice.bound_failure_rate, 1e-3)),
+    ):
+        assert share <= bound + 3.0 * np.sqrt(bound * (1.0 - bound) / RAYS), said
 
 
 @pytest.mark.slow
@@ -149,17 +172,11 @@ def test_the_bound_holds_where_nobody_looked(
         if not advice:
             continue
         given += 1
-        said = f"{source} on {device}, {budget:g} texels: {advice.reason}"
-        assert advice.bound_p99_texels is not None
-        assert advice.bound_failure_rate is not None
-        assert advice.bound_p99_texels <= budget
-        assert limits["max_time"] is None or advice.time_ns_per_ray <= limits["max_time"], said
-        assert limits["memory"] is None or advice.memory_bytes <= limits["memory"], said
-        if advice.cones_format not in (None, "r32float"):
-            continue  # march() has no cones in other formats
-        error, failing = measured(height_map, advice, rays, device)
-        print(f"{said}\n    unseen: {error:.4g} texels, {100 * failing:.3g} % failing")
-        # The budget itself, and what a share of 6000 rays may be above the bound by chance.
-        assert error <= max(budget, 1e-3), said
-        assert failing <= max(advice.bound_failure_rate, 1e-3) + 2.0 * np.sqrt(1e-3 / RAYS), said
+        assert limits["max_time"] is None or advice.time_ns_per_ray <= limits["max_time"], advice.reason
+        assert limits["memory"] is None or advice.memory_bytes <= limits["memory"], advice.reason
+        check(advice, height_map, rays, device, budget)
     assert given >= 3, "most budgets can be met"
+    for budget in (0.25, 1.0, 4.0, 16.0):
+        advice = result.recommend(budget, among=LOOSE, max_failure_rate=LOOSE_FAILING)
+        if advice:
+            check(advice, height_map, rays, device, budget)

@@ -101,7 +101,8 @@ class Recommendation:
         It has the functions ``search`` and ``occluded`` and a fragment entry point that shows how they
         are called. WGSL is what `render` runs; the others are made of it by naga: GLSL ES 3.00 (WebGL
         2) for searches that read a height texture, 3.10 for those that read buffers, HLSL of shader
-        model 5.1, MSL 2.0.
+        model 5.1, MSL 2.0, whose buffers, textures and samplers have slots from 0 on in the order of the
+        entry point's arguments; ``_buffer_sizes`` holds the bytes of buffers that end in an array.
 
         Parameters
         ----------

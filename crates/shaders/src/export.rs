@@ -174,11 +174,40 @@ fn to_hlsl(module: &Module, info: &ModuleInfo) -> Result<String, String> {
 }
 
 fn to_msl(module: &Module, info: &ModuleInfo) -> Result<String, String> {
-    let options =
-        msl::Options { fake_missing_bindings: true, lang_version: (2, 0), ..msl::Options::default() };
+    let options = msl::Options {
+        fake_missing_bindings: false,
+        lang_version: (2, 0),
+        per_entry_point_map: [(ENTRY.to_owned(), metal_slots(module))].into(),
+        ..msl::Options::default()
+    };
     msl::write_string(module, info, &options, &msl::PipelineOptions::default())
         .map(|(text, _)| text)
         .map_err(|error| error.to_string())
+}
+
+/// Slots of buffers, textures and samplers, each numbered by itself in the order of their declaration; behind the
+/// buffers comes one with the sizes of those that end in an array.
+fn metal_slots(module: &Module) -> msl::EntryPointResources {
+    let mut slots = msl::EntryPointResources::default();
+    let (mut buffers, mut textures, mut samplers) = (0, 0, 0);
+    let next = |count: &mut u8| {
+        *count += 1;
+        Some(*count - 1)
+    };
+    for (_, global) in module.global_variables.iter() {
+        let Some(binding) = global.binding else { continue };
+        let mut target = msl::BindTarget::default();
+        match module.types[global.ty].inner {
+            naga::TypeInner::Image { .. } => target.texture = next(&mut textures),
+            naga::TypeInner::Sampler { .. } => {
+                target.sampler = next(&mut samplers).map(msl::BindSamplerTarget::Resource);
+            }
+            _ => target.buffer = next(&mut buffers),
+        }
+        slots.resources.insert(binding, target);
+    }
+    slots.sizes_buffer = next(&mut buffers);
+    slots
 }
 
 #[cfg(test)]
@@ -214,6 +243,15 @@ mod tests {
                 assert!(text.contains("search") && text.contains("occluded"), "{name} {language:?}");
             }
         }
+    }
+
+    #[test]
+    fn metal_gets_slots_that_it_has() {
+        let text = export_search("exact", &[], Language::Msl).unwrap();
+        for slot in ["[[texture(0)]]", "[[sampler(0)]]", "[[buffer(0)]]", "[[buffer(1)]]", "[[buffer(2)]]"] {
+            assert_eq!(text.matches(slot).count(), 1, "{slot}");
+        }
+        assert!(!text.contains("fake"));
     }
 
     #[test]
