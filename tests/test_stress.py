@@ -289,6 +289,32 @@ def test_faults_of_frames_are_found() -> None:
     assert {"upright", "handedness is 1 or -1"} <= checks(found)
 
 
+@pytest.mark.parametrize("method", ["mikktspace", "averaged", "split", "edge"])
+def test_mirrored_and_turned_tangents_are_found(method: str) -> None:
+    def bent(how: Any) -> set[str]:
+        def made(positions: Any, faces: Any, uv: Any, normals: Any, name: str) -> Any:
+            right = bw.tangents(positions, faces, uv, normals, name)
+            return right._replace(tangents=how(right.tangents.copy(), normals[right.source]))
+
+        return checks(bw.stress([], maps=[], frames=[method], tangents=made))
+
+    def one_handed(found: Any, _: Any) -> Any:
+        # Mirrored charts are taken for others.
+        found[:, 3] = -found[:, 3].max()
+        return found
+
+    def swapped(found: Any, normals: Any) -> Any:
+        # The bitangent in place of the tangent.
+        found[:, :3] = found[:, 3:] * np.cross(normals, found[:, :3])
+        return found
+
+    assert bent(one_handed) == {"hand of the chart"}
+    assert bent(lambda found, _: found * np.float32([1, 1, 1, -1])) == {"hand of the chart"}
+    assert bent(lambda found, _: found * np.float32([-1, -1, -1, 1])) == {"along u"}
+    assert "along u" in bent(swapped)
+    assert not bent(lambda found, _: found)
+
+
 # The judge
 
 
