@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 __all__ = ["plot"]
 
 _SUFFIXES = (".png", ".svg", ".pdf")
+#: Quotient of the ends of the time axis up to which each decade has three numbers.
+_FEW_DECADES = 300.0
 _DPI = 130
 _FONT_POINTS = 7.5
 
@@ -76,10 +78,18 @@ def _marker(color: str, name: str, filled: bool = True) -> Any:
 
 
 def _draw_panel(axes: Any, result: CompareResult, elevation: Any, palette: dict[str, str]) -> None:
+    from matplotlib.ticker import LogLocator, NullLocator
+
     shown = points(result, elevation)
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.set_xlim(*axis_range([end for p in shown for end in (p.low_ns, p.high_ns)], 0.5))
+    low, high = axis_range([end for p in shown for end in (p.low_ns, p.high_ns)], 0.5)
+    axes.set_xlim(low, high)
+    # Few enough for whole numbers beside each other.
+    parts = (1.0, 2.0, 5.0) if high < _FEW_DECADES * low else (1.0,)
+    axes.xaxis.set_major_locator(LogLocator(subs=parts))
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.xaxis.set_minor_locator(NullLocator())
     axes.set_ylim(*axis_range([p.error_texels for p in shown], 2.0))
     axes.grid(True, which="major", color="#dddddd", linewidth=0.6)
     axes.set_axisbelow(True)
