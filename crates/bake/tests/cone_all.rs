@@ -189,11 +189,19 @@ impl Surface {
         most
     }
 
-    /// The widest cones, all of them.
-    fn ratios(&self) -> Vec<f64> {
-        let places: Vec<[i64; 2]> = (0..self.n * self.n).map(|at| [at % self.n, at / self.n]).collect();
+    /// The widest cones of the texels of some rows, with their places on the map.
+    fn ratios(&self, rows: &[i64]) -> Vec<(usize, f64)> {
+        let n = self.n;
+        let places = |rows: Vec<i64>| -> Vec<[i64; 2]> {
+            rows.into_iter().flat_map(|j| (0..n).map(move |i| [i, j])).collect()
+        };
+        let beside = |j: i64| rows.iter().any(|row| (row - j + 1).rem_euclid(n) <= 2);
+        let looked_at = places((0..n).filter(|&j| beside(j)).collect());
         let all = |f: &(dyn Fn([i64; 2]) -> f64 + Sync)| -> Vec<f64> {
-            places.par_iter().map(|&place| f(place)).collect()
+            let found: Vec<f64> = looked_at.par_iter().map(|&place| f(place)).collect();
+            let mut map = vec![f64::NAN; (n * n) as usize];
+            looked_at.iter().zip(found).for_each(|(&place, rise)| map[self.at(place)] = rise);
+            map
         };
         let centres = all(&|place| self.rise_of_centre(place));
         let edges = [all(&|place| self.rise_of_edge(place, 0)), all(&|place| self.rise_of_edge(place, 1))];
@@ -209,15 +217,15 @@ impl Surface {
             }
             1.0 / most
         };
-        places.iter().map(ratio).collect()
+        places(rows.to_vec()).iter().map(|place| (self.at(*place), ratio(place))).collect()
     }
 }
 
-/// The least and the most that a map gives away.
-fn given_away(field: &HeightField) -> [f64; 2] {
+/// The least and the most that some rows of a map give away.
+fn given_away(field: &HeightField, rows: &[i64]) -> [f64; 2] {
     let map = cone_map(field, ConeMode::Conservative, Progress::none()).unwrap();
-    let truth = Surface::new(field).ratios();
-    let lost = truth.iter().zip(&map).map(|(truth, &ratio)| truth - f64::from(ratio));
+    let truth = Surface::new(field).ratios(rows);
+    let lost = truth.iter().map(|&(at, truth)| truth - f64::from(map[at]));
     lost.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], lost| [least.min(lost), most.max(lost)])
 }
 
@@ -245,9 +253,9 @@ fn fields(n: usize) -> Vec<(&'static str, HeightField)> {
     ]
 }
 
-fn check(n: usize) {
+fn check(n: usize, rows: impl Iterator<Item = i64> + Clone) {
     for (name, field) in fields(n) {
-        let [least, most] = given_away(&field);
+        let [least, most] = given_away(&field, &rows.clone().collect::<Vec<_>>());
         println!("{n} x {n} {name}: gives away {least:.1e} to {most:.1e}");
         assert!(least >= -1e-9 && most <= 1e-6, "{name}: {least:.2e} to {most:.2e}");
     }
@@ -255,11 +263,11 @@ fn check(n: usize) {
 
 #[test]
 fn all_cones_of_small_maps_are_those_of_all_pairs() {
-    check(20);
+    check(20, 0..20);
 }
 
 #[test]
-#[ignore = "minutes: all pairs of 65536 texels with 65536 cells and edges"]
-fn all_cones_of_256_texels_squared_are_those_of_all_pairs() {
-    check(256);
+#[ignore = "minutes: 1792 texels of each map and those around them, each with 65536 cells and edges"]
+fn rows_of_cones_of_256_texels_squared_are_those_of_all_pairs() {
+    check(256, (5..256).step_by(37));
 }
