@@ -367,6 +367,38 @@ def test_tagged_and_hostile_textures(normals: np.ndarray, tmp_path: Path) -> Non
             bw.HeightMap(path, channel="r")
 
 
+def test_textures_of_several_pictures(tmp_path: Path) -> None:
+    path = tmp_path / "wall_height.dds"
+    Image.fromarray(np.arange(256, dtype=np.uint8).reshape(16, 16)).convert("RGBA").save(path)
+    plain = path.read_bytes()
+    first, texels = bw.HeightMap(path, channel="r").array, plain[128:]
+    newer = plain[:80] + struct.pack("<I4s", 4, b"DX10") + plain[88:128]
+    for head, count in (
+        (plain[:112] + struct.pack("<I", 0xFE00) + plain[116:128], 6),
+        (plain[:24] + struct.pack("<I", 3) + plain[28:112] + struct.pack("<I", 0x200000) + plain[116:128], 3),
+        (newer + struct.pack("<5I", 28, 3, 0, 4, 0), 4),
+        (newer + struct.pack("<5I", 28, 3, 4, 1, 0), 6),
+    ):
+        path.write_bytes(head + texels + bytes(len(texels)) * (count - 1))
+        with pytest.warns(bw.BumpWarning, match=f"holds {count} pictures .*; the first is read"):
+            found = bw.HeightMap(path, channel="r").array
+        np.testing.assert_array_equal(found, first)
+        assert "several-pictures" in codes(bw.lint(path)), count
+
+
+def test_signed_blocks(tmp_path: Path) -> None:
+    """BC5 of numbers with a sign, -127 to 127: a block of its larger end, one of its smaller one."""
+    path = tmp_path / "wall_normal.dds"
+    head = b"DDS " + struct.pack("<7I", 124, 0x1007, 4, 8, 0, 0, 0) + bytes(44)
+    head += struct.pack("<2I4s5I", 32, 4, b"DX10", 0, 0, 0, 0, 0) + struct.pack("<5I", 0x1000, 0, 0, 0, 0)
+    high, low = struct.pack("<2b", 90, -90) + bytes(6), struct.pack("<2b", -90, 90) + bytes(6)
+    path.write_bytes(head + struct.pack("<5I", 84, 3, 0, 1, 0) + (high + low) + (low + high))
+    for channel, (left, right) in (("r", (90, -90)), ("g", (-90, 90))):
+        read = 2.0 * bw.HeightMap(path, channel=channel).array - 1.0
+        np.testing.assert_allclose(read[:, :4], left / 127, atol=4e-5)
+        np.testing.assert_allclose(read[:, 4:], right / 127, atol=4e-5)
+
+
 def test_palettes_are_looked_up(tmp_path: Path) -> None:
     path = tmp_path / "wall_height.dds"
     Image.new("RGBA", (16, 16)).save(path)

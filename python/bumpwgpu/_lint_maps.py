@@ -291,6 +291,9 @@ def _tags(texts: list[str]) -> list[Found]:
         if "sRGB" in text or "gamma" in text:
             fix = "Save it without a colour profile, and import it as linear data."
             found.append(("srgb-tagged", "error", text, fix))
+        elif "the first is read" in text:
+            fix = "Save each picture as a file of its own."
+            found.append(("several-pictures", "warning", text, fix))
         elif "in blocks" in text:
             fix = "Keep normals in BC5 or BC7, and heights in BC4 or 16 bits."
             found.append(("lossy", "warning", text, fix))

@@ -30,6 +30,7 @@ CODES: dict[str, str] = {
     "unknown-role": "the name does not say what the file holds",
     "srgb-tagged": "data tagged as colour is bent by every viewer and importer that believes the tag",
     "lossy": "compression for photographs leaves blocks that light up as bumps",
+    "several-pictures": "faces of a cube map, members of an array and slices of a volume are not looked at",
     "8-bit-heights": "256 levels show as terraces on anything smooth",
     "flat-heights": "there is no relief",
     "unused-range": "most of the levels are not used",

@@ -19,8 +19,9 @@ def info() -> dict[str, Any]:
     Returns
     -------
     dict
-        ``version``, ``python``, ``numpy``, ``platform``, ``threads``, ``simd`` (the instruction set
-        of the processor that the exact search can use), ``techniques``, and ``adapters``: a list of
+        ``version``, ``python``, ``numpy``, ``platform``, ``threads``, ``simd`` (the vector instructions
+        that searches use: "baseline", "avx2", "avx512" or "neon"; the environment variable
+        ``BUMPWGPU_SIMD`` may name lesser ones), ``techniques``, and ``adapters``: a list of
         dicts with ``name``, ``driver``, ``driver_info`` and ``kind`` ("discrete", "integrated",
         "virtual", "software" or "other"), the preferred one first; empty without a Vulkan device.
 

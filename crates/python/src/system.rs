@@ -8,28 +8,9 @@ pub fn threads(py: Python<'_>) -> PyResult<usize> {
     crate::run::run(py, None, |_| Ok::<_, std::convert::Infallible>(rayon::current_num_threads()))
 }
 
-/// The widest vector instructions of the processor.
+/// The vector instructions that searches and bakes use: the best the processor has, or up to what `BUMPWGPU_SIMD`
+/// allows.
 #[pyfunction]
 pub fn simd_level() -> &'static str {
-    #[cfg(target_arch = "x86_64")]
-    {
-        if std::arch::is_x86_feature_detected!("avx512f") {
-            return "avx512";
-        }
-        if std::arch::is_x86_feature_detected!("avx2") {
-            return "avx2";
-        }
-        if std::arch::is_x86_feature_detected!("sse4.2") {
-            return "sse4.2";
-        }
-        "sse2"
-    }
-    #[cfg(target_arch = "aarch64")]
-    {
-        "neon"
-    }
-    #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
-    {
-        "none"
-    }
+    heightfield::lanes::Level::best().name()
 }
