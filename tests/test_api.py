@@ -7,6 +7,7 @@ import doctest
 import importlib
 import inspect
 import json
+import os
 import pickle
 import pkgutil
 import subprocess
@@ -170,7 +171,15 @@ def test_info() -> None:
     assert found["version"] == bw.__version__
     assert found["threads"] >= 1
     assert found["techniques"] == list(techniques.names())
+    assert found["simd"] in ("baseline", "avx2", "avx512", "neon")
     json.dumps(found)
+
+
+def test_lesser_instructions_are_named() -> None:
+    environment = {**os.environ, "BUMPWGPU_SIMD": "baseline"}
+    command = [sys.executable, "-c", "import bumpwgpu as bw; print(bw.info()['simd'])"]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() in ("baseline", "neon")
 
 
 def stub_classes() -> dict[str, dict[str, int]]:
