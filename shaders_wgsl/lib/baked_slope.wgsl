@@ -8,9 +8,13 @@
 
 fn baked_slope(point: SurfacePoint) -> vec2f {
     let texel = textureSampleGrad(slope_texture, slope_sampler, point.uv, point.uv_dx, point.uv_dy);
-    let tile = max(vec2f(length(point.surface.dpdu), length(point.surface.dpdv)), vec2f(1e-30));
-    let deviation = texel.zw * material.scale / tile;
-    slope_variance = 0.5 * dot(deviation, deviation);
+    if specular_aa {
+        let surface = point.surface;
+        let volume = dot(cross(surface.dpdu, surface.dpdv), surface.normal);
+        let deviation = texel.zw * (material.scale / max(abs(volume), 1e-30));
+        lean_u = steepest(deviation.x * cross(surface.normal, surface.dpdv));
+        lean_v = steepest(deviation.y * cross(surface.dpdu, surface.normal));
+    }
     let factor = slope_factor(point.uv, vec2f(material.map_width, material.map_height), wrap_mode());
     return texel.xy * factor * material.scale;
 }

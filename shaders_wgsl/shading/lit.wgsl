@@ -23,12 +23,25 @@ struct Lit {
     trace: u32,            // what to note of it
 }
 
+// The lobe around a world normal: what leans in the mesh's space leans like normals do, by the inverse transpose.
+fn lit_gloss(normal: vec3f) -> Gloss {
+    if !specular_aa {
+        return spread_gloss(material.specular, material.shininess, vec3f(0.0), vec3f(0.0));
+    }
+    let unit = length((vec4f(normal, 0.0) * draw.relative_from_object).xyz);
+    let u = (vec4f(lean_u, 0.0) * draw.object_from_relative).xyz * unit;
+    let v = (vec4f(lean_v, 0.0) * draw.object_from_relative).xyz * unit;
+    return spread_gloss(
+        material.specular, material.shininess,
+        steepest(u - normal * dot(normal, u)), steepest(v - normal * dot(normal, v)));
+}
+
 // `position`: camera-relative world; `normal`: unit, world.
 fn lit(albedo: vec3f, position: vec3f, normal: vec3f, point: ShadowPoint) -> Lit {
     let to_eye = normalize_or(-position, normal);
     var result: Lit;
     result.color = albedo * frame.ambient.rgb;
-    let gloss = spread_gloss(material.specular, material.shininess);
+    let gloss = lit_gloss(normal);
     result.trace = select(0u, TRACE_SHADOWED, tests_shadows() && SHADOW_RAYS > 0u);
     let brightest = max(albedo.r, max(albedo.g, albedo.b));
     var facing = 0u;
@@ -49,7 +62,7 @@ fn lit(albedo: vec3f, position: vec3f, normal: vec3f, point: ShadowPoint) -> Lit
         var share_hidden = 0.0;
         var faint = false;
         if skip_faint {
-            let most = max(radiance.r, max(radiance.g, radiance.b)) * (brightest * cosine + gloss.x);
+            let most = max(radiance.r, max(radiance.g, radiance.b)) * (brightest * cosine + gloss.share);
             faint = most <= unseen || min(result.color.r, min(result.color.g, result.color.b)) >= 1.0;
         }
         if tests_shadows() && !faint {
@@ -67,7 +80,7 @@ fn lit(albedo: vec3f, position: vec3f, normal: vec3f, point: ShadowPoint) -> Lit
             continue;
         }
         result.color += (1.0 - share_hidden) * blinn_phong(
-            normal, to_light, to_eye, albedo, radiance, gloss.x, gloss.y);
+            normal, to_light, to_eye, albedo, radiance, gloss);
     }
     result.blocked = blocked / f32(max(facing, 1u));
     return result;

@@ -10,7 +10,12 @@
 
 fn shading_normal(point: SurfacePoint) -> vec3f {
     let texel = textureSampleGrad(normal_texture, normal_sampler, point.uv, point.uv_dx, point.uv_dy);
-    slope_variance = (1.0 - texel.w) / max(texel.w, 1e-3);
+    if specular_aa {
+        // The length of a mean of normals does not tell which way they lean: the same all around.
+        let deviation = sqrt((1.0 - texel.w) / max(texel.w, 1e-3));
+        lean_u = deviation * point.tangent.xyz;
+        lean_v = deviation * cross(point.surface.normal, point.tangent.xyz);
+    }
     var normal_ts = texel.xyz * 2.0 - 1.0;
     if wrap_mode() == WRAP_MIRROR {
         let size = vec2f(textureDimensions(normal_texture));
