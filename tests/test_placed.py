@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 import bumpwgpu as bw
 
-pytestmark = pytest.mark.gpu
+# Some cast no shadows, and say so.
+pytestmark = [pytest.mark.gpu, pytest.mark.filterwarnings("ignore::bumpwgpu.BumpWarning")]
 
 WAYS = [*((name, False) for name in bw.techniques.names()), ("exact", True)]
 # Those that the quick tests try.

@@ -11,8 +11,11 @@ than a degree, far away, stands for parallel rays.
 
 Covered: pixels with anything in them. Outline: pixels covered in only one of the two, and how far the worst
 is from the other's outline. Astray: pixels covered in both whose depth is not within a pixel of Blender's in
-the pixels around, all nine rays of each, and those only Blender covers, all around. Place: distance between the two points, in pixels, where depth does not jump.
-Shadow: share of the pixels that are lit in only one, a pixel away from the edge of any shadow.
+the pixels around, all nine rays of each, and those only Blender covers, all around. Place: distance between
+the two points, in pixels, where depth does not jump. Shadow: share of the pixels that are lit in only one, a
+pixel away from the edge of any shadow.
+
+Blender leaves the gaps open that seams and hard edges tear; strips close them here.
 
 Models: `python tests/peers/run.py blender_displaced -- --models folder/*.obj`
 """
