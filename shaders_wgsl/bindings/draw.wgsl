@@ -1,16 +1,10 @@
-// Group 3: one mesh in the scene. Object space here has its origin at the middle of the mesh, so that
-// far-off coordinates lose no digits. Host: `crates/render/src/uniforms.rs`.
+// Group 3: one mesh in the scene. In programs that trace rays through shells `bindings/draw_among_solids.wgsl` stands in
+// for it.
+#import "bindings/frame.wgsl"
+#import "lib/draw_info.wgsl"
 
-struct DrawInfo {
-    relative_from_object: mat4x4f,   // to camera-relative world space
-    object_from_relative: mat4x4f,   // its inverse; transposed, it takes normals to world space
-    eye: vec4f,                      // camera, object space; w is 1
-    most_heights: vec3f,             // times the way from the eye: heights that a hit may be off
-    most_texels: f32,                // texels that it may be off in place of that
-    span: vec2f,                     // the lowest and the highest point of the map
-    own: vec2u,                      // its number among the instances that cast shadows, and of its solid
+@group(3) @binding(0) var<uniform> draws: array<DrawInfo, 1>;
+
+fn draw_info() -> DrawInfo {
+    return draws[nought()];
 }
-
-// A storage buffer: Mesa 22.3 crashes over loops whose ends depend on a matrix in a uniform, as those do that trace
-// rays in object space (lavapipe's inlining of uniforms).
-@group(3) @binding(0) var<storage, read> draw: DrawInfo;

@@ -28,7 +28,7 @@ fn vertex(in: VertexIn) -> Varyings {
 
 @fragment
 fn fragment(in: Varyings, @builtin(front_facing) front: bool) -> Targets {
-    enter_solid(draw.own.y);
+    enter_solid(draw_info().own.y);
     let face = in.face & ~ON_STRIP;
     var point = facing(gathered(face, in.weights), front);
     point = with_footprint(point, in.position);

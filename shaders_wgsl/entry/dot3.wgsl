@@ -34,9 +34,9 @@ fn vertex(in: VertexIn) -> Varyings {
     // The light vector is found here and interpolated as it is, as fixed-function hardware did.
     out.light_ts = vec3f(0.0, 0.0, 1.0);
     if light_count() > 0u {
-        let light = lights[0];
+        let light = light_at(0u);
         let offset = light.place.xyz - light.place.w * relative_position(in.position);
-        let offset_object = normalize_or((draw.object_from_relative * vec4f(offset, 0.0)).xyz, in.normal);
+        let offset_object = normalize_or((draw_info().object_from_relative * vec4f(offset, 0.0)).xyz, in.normal);
         let bitangent = in.tangent.w * cross(in.normal, in.tangent.xyz);
         out.light_ts = vec3f(
             dot(offset_object, in.tangent.xyz), dot(offset_object, bitangent), dot(offset_object, in.normal));
@@ -57,7 +57,7 @@ fn fragment(in: Varyings, @builtin(front_facing) front: bool) -> Targets {
     var color = albedo * frame.ambient.rgb;
     if light_count() > 0u {
         // Attenuation was a texture of its own; it is exact here.
-        let light = lights[0];
+        let light = light_at(0u);
         let offset = light.place.xyz - light.place.w * relative;
         let falloff = select(1.0 / max(dot(offset, offset), 1e-12), 1.0, light.place.w == 0.0);
         color += albedo * light.color.rgb * (diffuse * falloff);

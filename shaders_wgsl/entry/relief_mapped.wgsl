@@ -6,3 +6,9 @@
 fn fragment(in: Varyings, @builtin(front_facing) front: bool) -> ReliefTargets {
     return shade_relief(in.position, seen(in, front));
 }
+
+// Of draws that are sorted by their meshes: what is hidden is thrown away before any of this.
+@fragment
+fn fragment_apart(in: Varyings, @builtin(front_facing) front: bool) -> Targets {
+    return without_depth(shade_relief(in.position, seen(in, front)));
+}

@@ -19,16 +19,16 @@ fn vertex(@location(0) position: vec3f) -> Varyings {
 fn fragment(in: Varyings) -> ReliefTargets {
     // 1 along the view axis.
     let away = frame.corner.xyz + in.clip.x * frame.pixel_right.xyz + in.clip.y * frame.pixel_down.xyz;
-    let direction = (draw.object_from_relative * vec4f(away, 0.0)).xyz;
+    let direction = (draw_info().object_from_relative * vec4f(away, 0.0)).xyz;
     let stretch = length(direction);
-    enter_solid(draw.own.y);
-    let hit = trace_solid(shell_ray(draw.eye.xyz, direction, frame.forward.w * stretch), 1e30);
+    enter_solid(draw_info().own.y);
+    let hit = trace_solid(shell_ray(draw_info().eye.xyz, direction, frame.forward.w * stretch), 1e30);
     if !hit.found {
         discard;
     }
     let depth = hit.t / stretch;
     let relative = away * depth;
-    let position = draw.eye.xyz + direction * depth;
+    let position = draw_info().eye.xyz + direction * depth;
     var point = facing(gathered(hit.face, hit.weights), !hit.inside);
     point = with_footprint(point, position);
     // The chord's place is off by its sag; that of the weights lies on the surface itself.

@@ -45,8 +45,8 @@ fn approach(ray: TextureRay, direction: vec3f, own: f32) -> Approach {
     let sideways = length(ray.delta.xy * vec2f(material.map_width, material.map_height));
     let drop = max(-ray.delta.z, 1e-30);
     // How far a hit may be off, in heights.
-    let allowed = max(draw.most_texels * drop / max(sideways, 1e-30), dot(direction, draw.most_heights)) - own;
-    var left = vec2f(draw.span.x, max(min(draw.span.y, ray.start.z), draw.span.x));
+    let allowed = max(draw_info().most_texels * drop / max(sideways, 1e-30), dot(direction, draw_info().most_heights)) - own;
+    var left = vec2f(draw_info().span.x, max(min(draw_info().span.y, ray.start.z), draw_info().span.x));
     let over = ground_ray(ray.start, ray.delta);
     if !skip_march {
         for (var i = 0; i < LOOKS; i++) {

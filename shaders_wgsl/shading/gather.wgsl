@@ -28,10 +28,10 @@ fn gathered(face: u32, weights: vec2f) -> SurfacePoint {
 
 // The derivatives of the uv along the screen, were the point on the mesh. position: object space.
 fn with_footprint(point: SurfacePoint, position: vec3f) -> SurfacePoint {
-    let depth = dot((draw.relative_from_object * vec4f(position, 1.0)).xyz, frame.forward.xyz);
-    let right = depth * (draw.object_from_relative * vec4f(frame.pixel_right.xyz, 0.0)).xyz;
-    let down = depth * (draw.object_from_relative * vec4f(frame.pixel_down.xyz, 0.0)).xyz;
-    let away = position - draw.eye.xyz;
+    let depth = dot((draw_info().relative_from_object * vec4f(position, 1.0)).xyz, frame.forward.xyz);
+    let right = depth * (draw_info().object_from_relative * vec4f(frame.pixel_right.xyz, 0.0)).xyz;
+    let down = depth * (draw_info().object_from_relative * vec4f(frame.pixel_down.xyz, 0.0)).xyz;
+    let away = position - draw_info().eye.xyz;
     var seen = point;
     seen.uv_dx = footprint(point.surface, away, right);
     seen.uv_dy = footprint(point.surface, away, down);

@@ -28,9 +28,9 @@ fn lit_gloss(normal: vec3f) -> Gloss {
     if !specular_aa {
         return spread_gloss(material.specular, material.shininess, vec3f(0.0), vec3f(0.0));
     }
-    let unit = length((vec4f(normal, 0.0) * draw.relative_from_object).xyz);
-    let u = (vec4f(lean_u, 0.0) * draw.object_from_relative).xyz * unit;
-    let v = (vec4f(lean_v, 0.0) * draw.object_from_relative).xyz * unit;
+    let unit = length((vec4f(normal, 0.0) * draw_info().relative_from_object).xyz);
+    let u = (vec4f(lean_u, 0.0) * draw_info().object_from_relative).xyz * unit;
+    let v = (vec4f(lean_v, 0.0) * draw_info().object_from_relative).xyz * unit;
     return spread_gloss(
         material.specular, material.shininess,
         steepest(u - normal * dot(normal, u)), steepest(v - normal * dot(normal, v)));
@@ -49,7 +49,7 @@ fn lit(albedo: vec3f, position: vec3f, normal: vec3f, point: ShadowPoint) -> Lit
     let count = light_count();
     let unseen = LEAST_STEP / f32(max(count, 1u));
     for (var i = 0u; i < count; i++) {
-        let light = lights[i];
+        let light = light_at(i);
         let distant = light.place.w == 0.0;
         let offset = light.place.xyz - light.place.w * position;
         let to_light = normalize_or(offset, normal);
@@ -66,7 +66,7 @@ fn lit(albedo: vec3f, position: vec3f, normal: vec3f, point: ShadowPoint) -> Lit
             faint = most <= unseen || min(result.color.r, min(result.color.g, result.color.b)) >= 1.0;
         }
         if tests_shadows() && !faint {
-            let offset_object = (draw.object_from_relative * vec4f(offset, 0.0)).xyz;
+            let offset_object = (draw_info().object_from_relative * vec4f(offset, 0.0)).xyz;
             let shadow = hidden(point, offset_object, distant);
             result.shadow_rays += shadow.rays;
             share_hidden = shadow.share;

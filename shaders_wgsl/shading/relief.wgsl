@@ -12,9 +12,23 @@
 // rounding in the hit then cannot put them below the surface of the next cell.
 const SHADOW_LIFT: f32 = 1.0 / 65536.0;
 
+// The depth that decides what hides what: that of the hit, unless the ray has left the box around the draw by then.
+// What lies in boxes that a plane parts is thus sorted as the meshes are (crates/render/src/sorting.rs).
+// `t`: of the hit along `direction`, from the mesh surface; `depth`: there.
+fn sorting_depth(position: vec3f, direction: vec3f, t: f32, depth: f32) -> f32 {
+    let inverse = 1.0 / select(vec3f(1e-30), direction, abs(direction) > vec3f(1e-30));
+    let to_low = (draw_info().low.xyz - position) * inverse;
+    let to_high = (draw_info().high.xyz - position) * inverse;
+    let enters = min(to_low, to_high);
+    let leaves = max(to_low, to_high);
+    let first = min(max(max(enters.x, enters.y), enters.z), 0.0);
+    let last = max(min(min(leaves.x, leaves.y), leaves.z), 0.0);
+    return depth * (1.0 + clamp(t, first, last)) / max(1.0 + t, 1e-30);
+}
+
 // `position`: of the mesh surface, object space; `point.uv`: there.
 fn shade_relief(position: vec3f, point: SurfacePoint) -> ReliefTargets {
-    let direction = position - draw.eye.xyz;
+    let direction = position - draw_info().eye.xyz;
     let ray = texture_ray(
         point.surface, direction, point.uv, material.scale, material.base, tile_period());
     let need = approach(ray, direction, slack(ray.cos_theta));
@@ -22,9 +36,7 @@ fn shade_relief(position: vec3f, point: SurfacePoint) -> ReliefTargets {
     if need.spared {
         let tau = clamp((ray.start.z - need.z) / max(-ray.delta.z, 1e-30), 0.0, 1.0);
         found = found_hit(tau, 1u);
-    } else if draw.eye.w != 0.0 {
-        // Pixels drawn only for their neighbours' derivatives may read zeros from buffers, the 1 behind the eye among
-        // them. Marched, they would follow a wrong ray over ground of height 0 for as long as the search lets them.
+    } else {
         found = search(ray.start, ray.delta, ray.cos_theta, need.stretch);
     }
 
@@ -52,6 +64,6 @@ fn shade_relief(position: vec3f, point: SurfacePoint) -> ReliefTargets {
     out.normal = vec4f(normal, ray.cos_theta);
     out.ray_start = vec4f(ray.start, ray.tile.x);
     out.ray_delta = vec4f(ray.delta, ray.tile.y);
-    out.depth = target_depth(depth);
+    out.depth = target_depth(sorting_depth(position, direction, ray.t_start + found.tau * ray.t_length, depth));
     return out;
 }

@@ -18,3 +18,7 @@ struct ReliefTargets {
 fn target_depth(depth: f32) -> f32 {
     return clamp(frame.forward.w / max(depth, frame.forward.w), 0.0, 1.0);
 }
+
+fn without_depth(out: ReliefTargets) -> Targets {
+    return Targets(out.color, out.trace, out.place, out.position, out.normal, out.ray_start, out.ray_delta);
+}

@@ -47,7 +47,7 @@ fn hidden(point: ShadowPoint, to_light: vec3f, distant: bool) -> Hidden {
 fn clears(start: vec3f, delta: vec3f) -> f32 {
     let top = start.z + delta.z;
     let over = ground_ray(start, delta);
-    var high = clamp(draw.span.y, start.z, top);
+    var high = clamp(draw_info().span.y, start.z, top);
     high = clamp(ground_heights(ground_node(over, start.z, high)).y, start.z, high);
     let node = ground_node(over, start.z, high);
     high = clamp(ground_heights(node).y, start.z, high);

@@ -31,7 +31,7 @@ fn blocks(at: u32, point: ShadowPoint, relative: vec3f, to_light: vec3f, last: f
     let instance = instances[at];
     enter_solid(instance.solid);
     let direction = (instance.object_from_relative * vec4f(to_light, 0.0)).xyz;
-    let starts_here = at == draw.own.x;
+    let starts_here = at == draw_info().own.x;
     var origin = point.position;
     if !starts_here {
         origin = (instance.object_from_relative * vec4f(relative, 1.0)).xyz;
@@ -45,8 +45,8 @@ fn blocks(at: u32, point: ShadowPoint, relative: vec3f, to_light: vec3f, last: f
 
 // The share of the light that is hidden: all or nothing. `to_light`: object space, its full distance.
 fn hidden(point: ShadowPoint, to_light: vec3f, distant: bool) -> Hidden {
-    let relative = (draw.relative_from_object * vec4f(point.position, 1.0)).xyz;
-    let direction = (draw.relative_from_object * vec4f(to_light, 0.0)).xyz;
+    let relative = (draw_info().relative_from_object * vec4f(point.position, 1.0)).xyz;
+    let direction = (draw_info().relative_from_object * vec4f(to_light, 0.0)).xyz;
     let last = select(1.0, 1e30, distant);
     let inverse = inverse_of(direction);
     var stack: array<u32, TOP_STACK>;

@@ -70,7 +70,7 @@ impl FrameBinding {
 }
 
 /// The lights as the shaders want them; never empty, since a buffer must not be.
-fn light_infos(scene: &Scene<'_>, eye: DVec3) -> Vec<LightInfo> {
+pub(crate) fn light_infos(scene: &Scene<'_>, eye: DVec3) -> Vec<LightInfo> {
     let mut infos: Vec<LightInfo> = scene
         .lights
         .iter()

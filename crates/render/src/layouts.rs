@@ -44,15 +44,12 @@ impl Layouts {
         let seen = ShaderStages::FRAGMENT | ShaderStages::COMPUTE;
         let heights_filter =
             if filterable { SamplerBindingType::Filtering } else { SamplerBindingType::NonFiltering };
-        let place = BindGroupLayoutEntry {
-            ty: BindingType::Buffer {
-                ty: BufferBindingType::Storage { read_only: true },
-                has_dynamic_offset: true,
-                min_binding_size: None,
-            },
-            ..entry(0, ShaderStages::VERTEX_FRAGMENT, storage(true))
+        let place = |ty| {
+            let place = BindingType::Buffer { ty, has_dynamic_offset: true, min_binding_size: None };
+            entry(0, ShaderStages::VERTEX_FRAGMENT, place)
         };
-        let mut draw = vec![place];
+        let own = place(BufferBindingType::Uniform);
+        let mut draw = vec![place(BufferBindingType::Storage { read_only: true })];
         draw.extend((1..=9).map(|binding| entry(binding, ShaderStages::FRAGMENT, storage(true))));
         let material = [
             entry(0, ShaderStages::FRAGMENT, uniform()),
@@ -97,10 +94,10 @@ impl Layouts {
                 "cells",
                 &[entry(0, seen, storage(true)), entry(1, seen, storage(true)), entry(2, seen, uniform())],
             ),
-            draw: make("draw", &draw[..1]),
+            draw: make("draw", &[own]),
             draw_with_bounds: make(
                 "draw with the bounds of its ground",
-                &[draw[0], entry(BOUNDS, ShaderStages::FRAGMENT, storage(true))],
+                &[own, entry(BOUNDS, ShaderStages::FRAGMENT, storage(true))],
             ),
             draw_with_solids: make("draw among solids", &draw),
             march: make(

@@ -37,6 +37,7 @@ mod resolve;
 pub mod scene;
 mod shell;
 pub mod skips;
+mod sorting;
 mod sparing;
 pub mod surface;
 mod tally;

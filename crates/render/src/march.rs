@@ -159,6 +159,7 @@ fn run(
         reads: Some(reads),
         constants,
         targets: TargetSet::none(),
+        apart: false,
         double_sided: false,
         mirrored: false,
     })?;

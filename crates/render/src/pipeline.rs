@@ -18,6 +18,8 @@ pub(crate) struct PipelineKey {
     pub reads: Option<Reads>,
     pub constants: Vec<(&'static str, i64)>,
     pub targets: TargetSet,
+    /// Whether hidden fragments go before they are marched: the draw is sorted by its mesh.
+    pub apart: bool,
     pub double_sided: bool,
     pub mirrored: bool,
 }
@@ -223,7 +225,7 @@ impl Device {
             multisample: wgpu::MultisampleState::default(),
             fragment: Some(wgpu::FragmentState {
                 module,
-                entry_point: Some("fragment"),
+                entry_point: Some(if key.apart { "fragment_apart" } else { "fragment" }),
                 compilation_options,
                 targets: &targets,
             }),

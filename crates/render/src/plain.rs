@@ -42,17 +42,20 @@ const BUMP: PlainTechnique = PlainTechnique {
     displaces: false,
 };
 
+/// Nothing but the mesh.
+pub(crate) const FLAT: PlainTechnique = PlainTechnique {
+    name: "flat",
+    summary: "the bare mesh, no relief",
+    source: "",
+    entry: "plain",
+    surface: "flat",
+    reads: None,
+    ..BUMP
+};
+
 /// All of them, the plainest first.
 pub const PLAIN_TECHNIQUES: [PlainTechnique; 10] = [
-    PlainTechnique {
-        name: "flat",
-        summary: "the bare mesh, no relief",
-        source: "",
-        entry: "plain",
-        surface: "flat",
-        reads: None,
-        ..BUMP
-    },
+    FLAT,
     PlainTechnique {
         name: "bump_forward",
         summary: "as bump, from forward differences: a read less, first order",

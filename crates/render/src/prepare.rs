@@ -15,12 +15,13 @@ use crate::heights::bind;
 use crate::layouts::{BOUNDS, BesideDraw};
 use crate::materials::{MaterialKey, material_group};
 use crate::pipeline::{PipelineKey, attributes, constants_of, reads_of};
+use crate::plain::FLAT;
 use crate::request::Program;
 use crate::shell::SceneSolids;
 use crate::sparing::Sparing;
 use crate::targets::TargetSet;
 use crate::uniforms::DrawInfo;
-use crate::{Device, Draw, RenderError, Request, Stats, TechniqueChoice};
+use crate::{Device, Draw, RenderError, Request, Scene, Stats, TechniqueChoice};
 
 /// What is drawn of a draw the same way in all views.
 pub(crate) struct Fixed {
@@ -37,6 +38,16 @@ pub(crate) struct Fixed {
 /// What is cut anew for each view; its pipeline is compiled when the first cut gives anything.
 pub(crate) struct Cutting {
     pub key: PipelineKey,
+}
+
+/// What a draw is in its scene.
+pub(crate) struct InScene<'a> {
+    /// Middle of its mesh.
+    pub middle: DVec3,
+    /// Whether it is sorted by its mesh.
+    pub apart: bool,
+    /// The solids of the scene and the number of its own, where rays are traced through shells.
+    pub solids: Option<(&'a SceneSolids, u32)>,
 }
 
 /// A draw, ready.
@@ -73,6 +84,8 @@ pub(crate) struct Shared {
     place: wgpu::BindGroup,
     /// Whether light rays are traced.
     shadows: bool,
+    /// Lights of the scene.
+    lights: usize,
 }
 
 /// Where a mesh is in memory.
@@ -95,18 +108,22 @@ fn entry<K: Eq + std::hash::Hash, V: Clone>(
 }
 
 impl Shared {
-    /// Room for so many draws. `shadows`: whether light rays are traced.
-    pub fn new(device: &Device, draws: usize, shadows: bool) -> Result<Self, RenderError> {
-        let alignment = u64::from(device.device.limits().min_storage_buffer_offset_alignment).max(16);
+    /// Room for the draws of a scene. `shadows`: whether light rays are traced.
+    pub fn new(device: &Device, scene: &Scene<'_>, shadows: bool) -> Result<Self, RenderError> {
+        let limits = device.device.limits();
+        let alignment =
+            limits.min_storage_buffer_offset_alignment.max(limits.min_uniform_buffer_offset_alignment);
+        let alignment = u64::from(alignment.max(16));
         let stride = (size_of::<DrawInfo>() as u64).next_multiple_of(alignment);
-        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
-        let places = device.buffer("places", stride * draws.max(1) as u64, usage)?;
+        let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+        let places = device.buffer("places", stride * scene.draws.len().max(1) as u64, usage)?;
         let place = place_group(device, &places, BesideDraw::Nothing, Vec::new())?;
         Ok(Self {
             places,
             stride,
             place,
             shadows,
+            lights: scene.lights.len(),
             meshes: HashMap::new(),
             runs: HashMap::new(),
             boxes: HashMap::new(),
@@ -115,14 +132,12 @@ impl Shared {
         })
     }
 
-    /// Prepares a draw whose mesh has its middle at `middle`. `solids`: of the scene and the number of its own, where
-    /// rays are traced through shells.
+    /// Prepares a draw.
     pub fn prepare(
         &mut self,
         device: &Device,
         draw: &Draw<'_>,
-        middle: DVec3,
-        solids: Option<(&SceneSolids, u32)>,
+        InScene { middle, apart, solids }: InScene<'_>,
         request: &Request,
         stats: &mut Stats,
     ) -> Result<Prepared, RenderError> {
@@ -131,11 +146,16 @@ impl Shared {
             && request.horizon.is_some()
             && request.shadows != Some(false)
             && request.technique.takes_horizon();
-        let reads = reads_of(&request.technique).filter(|_| solids.is_none());
-        let shadows = self.shadows;
+        let mut reads = reads_of(&request.technique).filter(|_| solids.is_none());
+        let light = (self.shadows, self.lights);
         let sparing = Sparing::of(device, draw, request)?;
+        if !program.horizon && sparing.shows_no_relief(draw, request) {
+            program = TechniqueChoice::Plain(&FLAT).program(false);
+            reads = None;
+        }
         let key = |program: Program, marches| {
-            key(draw, request, program, reads, shadows, sparing.constants(program, request, marches))
+            let apart = apart && BesideDraw::of(program.entry) == BesideDraw::Bounds;
+            key(draw, request, program, reads, light, apart, sparing.constants(program, request, marches))
         };
 
         let field = reads.map(|reads| device.field_group(&draw.material.field, reads)).transpose()?;
@@ -201,12 +221,16 @@ fn key(
     request: &Request,
     program: Program,
     reads: Option<Reads>,
-    shadows: bool,
+    (shadows, lights): (bool, usize),
+    apart: bool,
     sparing: Vec<(&'static str, i64)>,
 ) -> PipelineKey {
-    let mut constants = Vec::new();
+    let mut constants = vec![
+        ("albedo_map", i64::from(draw.material.albedo.is_some())),
+        ("single_light", i64::from(lights == 1)),
+    ];
     if let (TechniqueChoice::Search(technique), Some(_)) = (&request.technique, reads) {
-        constants = constants_of(technique, &draw.material.field);
+        constants.extend(constants_of(technique, &draw.material.field));
     }
     if program.entry != "dot3" {
         constants.push(("specular_aa", i64::from(request.specular_aa)));
@@ -223,6 +247,7 @@ fn key(
         reads,
         constants,
         targets: TargetSet::of(request.aovs),
+        apart,
         double_sided: draw.material.double_sided,
         mirrored: draw.world_from_object.determinant() < 0.0,
     }

@@ -14,6 +14,7 @@ use crate::prepare::{Prepared, Shared, address};
 use crate::readback::Readback;
 use crate::resolve::resolve;
 use crate::shell::SceneSolids;
+use crate::sorting::Sorting;
 use crate::tally::Tally;
 use crate::targets::{TargetSet, Targets};
 use crate::timer::Timer;
@@ -42,6 +43,8 @@ pub struct Renderer<'a> {
     shared: Shared,
     /// Where programs read them, from the first view on.
     solids: Option<SceneSolids>,
+    /// How draws of searches are sorted, from the first view on.
+    sorting: Option<Arc<Sorting>>,
     draws: Vec<Option<Prepared>>,
     /// Samples along a side of a pixel; the request is for as many more pixels.
     across: u32,
@@ -137,7 +140,8 @@ impl<'a> Renderer<'a> {
             across,
             central,
             solids: None,
-            shared: Shared::new(&device, scene.draws.len(), request.traces_light())?,
+            sorting: None,
+            shared: Shared::new(&device, &scene, request.traces_light())?,
             draws: scene.draws.iter().map(|_| None).collect(),
             targets: Targets::new(&device, TargetSet::of(request.aovs), width, rows_at_once)?,
             frame: FrameBinding::new(&device, &scene)?,

@@ -97,10 +97,23 @@ impl Sparing {
         self.skips.contains(Skips::PARALLAX) && off <= leeway.least
     }
 
+    /// Whether nothing tells the draw from the bare mesh.
+    pub fn shows_no_relief(&self, draw: &Draw<'_>, request: &Request) -> bool {
+        let base = draw.material.field.extent().base;
+        self.search.is_some()
+            && self.skips.contains(Skips::FLAT)
+            && self.ground.span == [base, base]
+            && draw.material.normal.is_none()
+            && !request.aovs.intersects(AovSet::RAY_START | AovSet::RAY_DELTA)
+    }
+
     /// Constants of the draw's pipeline, of those that its program has. `marches`: whether any pixel may need a march.
     pub fn constants(&self, program: Program, request: &Request, marches: bool) -> Vec<(&'static str, i64)> {
         let has = |kind| i64::from(self.skips.contains(kind));
         let mut constants = Vec::new();
+        if self.search.is_some() && program.search.is_none() {
+            constants.push(("flat_ground", 1));
+        }
         if self.search.is_some() && matches!(program.entry, "relief" | "relief_mapped") {
             constants.push(("skip_flat", has(Skips::FLAT)));
             constants.push(("skip_parallax", has(Skips::PARALLAX)));

@@ -1,7 +1,7 @@
 //! Structs shared with the shaders. A test compares them with naga's layout.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DMat4, Mat4, Vec4};
+use glam::{DMat4, Mat4, Vec3, Vec4};
 
 /// Twin of `FrameInfo` in `shaders_wgsl/bindings/frame.wgsl`.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -49,6 +49,14 @@ pub struct DrawInfo {
     pub object_from_relative: Mat4,
     /// Camera in the space of the centred mesh.
     pub eye: Vec4,
+    /// Lower corner of the box around what shows of it, space of the centred mesh.
+    pub low: Vec4,
+    /// Upper corner.
+    pub high: Vec4,
+    /// The first light: [`LightInfo::place`] and [`LightInfo::color`].
+    pub light_place: Vec4,
+    /// Its colour.
+    pub light_color: Vec4,
     /// Times the way from the camera: the heights that a hit may be off.
     pub most_heights: [f32; 3],
     /// Texels that it may be off in place of that.
@@ -60,13 +68,24 @@ pub struct DrawInfo {
 }
 
 impl DrawInfo {
-    /// Of a mesh that stands there; `own` as in [`DrawInfo::own`].
-    pub(crate) fn of(relative_from_object: DMat4, own: [u32; 2]) -> Self {
+    /// Of a mesh that stands there, and shows within the box `shown` around it; `light`: the first; `own` as in
+    /// [`DrawInfo::own`].
+    pub(crate) fn of(
+        relative_from_object: DMat4,
+        shown: [Vec3; 2],
+        light: &LightInfo,
+        own: [u32; 2],
+    ) -> Self {
+        let [low, high] = shown.map(|corner| corner.extend(0.0));
         let object_from_relative = relative_from_object.inverse();
         Self {
             relative_from_object: relative_from_object.as_mat4(),
             object_from_relative: object_from_relative.as_mat4(),
             eye: object_from_relative.w_axis.as_vec4(),
+            low,
+            high,
+            light_place: light.place,
+            light_color: light.color,
             own,
             ..Self::zeroed()
         }

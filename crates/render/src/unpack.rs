@@ -24,6 +24,10 @@ const RANGE: u32 = 1 << 19;
 const SHADOWED: u32 = 1 << 18;
 /// Most shadow rays that the trace counts.
 const MOST_RAYS: usize = 255;
+/// Kinds that are counted by the pixel; shadow rays are counted one by one.
+const COUNTED: [Skips; 3] = [Skips::FLAT, Skips::PARALLAX, Skips::RANGE];
+/// Pixels whose counts fit into 32 bits whatever they are: steps have 18.
+const COUNTED_AT_ONCE: usize = 1 << 12;
 
 fn status(trace: u32) -> u32 {
     (trace >> 28) & 3
@@ -114,46 +118,61 @@ impl Unpacker {
         }
     }
 
-    /// What was left out of a pixel, and how many shadow rays.
-    fn left_out(&self, trace: u32) -> (Skips, u32) {
-        let mut skips = Skips::NONE;
-        let mut note = |left_out: bool, kind| {
-            if left_out {
-                skips = skips | kind;
+    /// What was left out of a pixel: [`Skips::bits`], and how many shadow rays. Without branches, which the processor
+    /// would mispredict at every border.
+    fn left_out(&self, trace: u32) -> (u32, u32) {
+        let flag = |set: bool, kind: Skips| u32::from(set) * kind.bits();
+        let (marched, why) = (trace & MARCHED != 0, status(trace));
+        let cast = u32::from(trace & SHADOWED != 0);
+        let rays = cast * self.lights.saturating_sub(shadow_rays(trace));
+        let bits = flag(!marched & (why == 1), Skips::FLAT)
+            | flag(!marched & (why > 1), Skips::PARALLAX)
+            | flag(marched & (trace & RANGE != 0), Skips::RANGE)
+            | flag(rays > 0, Skips::SHADOW);
+        (bits, rays)
+    }
+
+    /// Adds the counts of all pixels.
+    fn count(&self, stats: &mut Stats) {
+        for part in self.trace.chunks(COUNTED_AT_ONCE) {
+            let [mut covered, mut marched, mut unconverged, mut walked, mut cast, mut spared] = [0_u32; 6];
+            let mut kinds = [0_u32; 3];
+            for &trace in part {
+                let was_marched = trace & MARCHED != 0;
+                covered += u32::from(trace & COVERED != 0);
+                marched += u32::from(was_marched);
+                unconverged += u32::from(was_marched & (status(trace) == 2));
+                walked += steps(trace);
+                cast += shadow_rays(trace);
+                let (bits, rays) = self.left_out(trace);
+                spared += rays;
+                for (count, kind) in kinds.iter_mut().zip(COUNTED) {
+                    *count += u32::from(bits & kind.bits() != 0);
+                }
             }
-        };
-        let marched = trace & MARCHED != 0;
-        note(!marched && status(trace) == 1, Skips::FLAT);
-        note(!marched && status(trace) > 1, Skips::PARALLAX);
-        note(marched && trace & RANGE != 0, Skips::RANGE);
-        let cast = trace & SHADOWED != 0;
-        let rays = if cast { self.lights.saturating_sub(shadow_rays(trace)) } else { 0 };
-        note(rays > 0, Skips::SHADOW);
-        (skips, rays)
+            stats.pixels_covered += u64::from(covered);
+            stats.pixels_marched += u64::from(marched);
+            stats.pixels_unconverged += u64::from(unconverged);
+            stats.steps += u64::from(walked);
+            stats.shadow_rays += u64::from(cast);
+            stats.skipped.add(Skips::SHADOW, u64::from(spared));
+            for (count, kind) in kinds.into_iter().zip(COUNTED) {
+                stats.skipped.add(kind, u64::from(count));
+            }
+        }
     }
 
     /// The frame, and the counts of its pixels.
     pub fn finish(mut self, stats: &mut Stats) -> Frame {
-        for &trace in &self.trace {
-            stats.pixels_covered += u64::from(trace & COVERED != 0);
-            stats.pixels_marched += u64::from(trace & MARCHED != 0);
-            stats.pixels_unconverged += u64::from(trace & MARCHED != 0 && status(trace) == 2);
-            let (skips, rays) = self.left_out(trace);
-            for kind in [Skips::FLAT, Skips::PARALLAX, Skips::RANGE] {
-                stats.skipped.add(kind, u64::from(skips.contains(kind)));
-            }
-            stats.skipped.add(Skips::SHADOW, u64::from(rays));
-            stats.steps += u64::from(steps(trace));
-            stats.shadow_rays += u64::from(shadow_rays(trace));
-        }
+        self.count(stats);
         if self.wanted.contains(AovSet::MASK) {
             self.aovs.mask = Some(self.trace.iter().map(|trace| u8::from(trace & COVERED != 0)).collect());
         }
         if self.wanted.contains(AovSet::SKIP) {
             let code = |&trace: &u32| {
-                let (skips, rays) = self.left_out(trace);
+                let (bits, rays) = self.left_out(trace);
                 let on_mesh = trace & MARCHED == 0 && status(trace) == 3;
-                skips.bits() | (u32::from(on_mesh) * Skips::ON_MESH) | (rays << Skips::RAYS_FROM_BIT)
+                bits | (u32::from(on_mesh) * Skips::ON_MESH) | (rays << Skips::RAYS_FROM_BIT)
             };
             self.aovs.skip = Some(self.trace.iter().map(code).collect());
         }

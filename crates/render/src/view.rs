@@ -1,5 +1,6 @@
 //! What is drawn of a scene from one place, and in which order.
 
+use std::cmp::Ordering::Equal;
 use std::ops::Range;
 use std::sync::Arc;
 use std::time::Instant;
@@ -25,6 +26,8 @@ pub(crate) struct Call {
     offset: u32,
     /// Distances along the view axis between which the draw is.
     span: [f64; 2],
+    /// Whether the draw is sorted by its mesh.
+    apart: bool,
 }
 
 impl Call {
@@ -76,7 +79,8 @@ impl<'a> ViewOf<'a> {
         warnings: &mut Vec<String>,
     ) -> Result<bool, RenderError> {
         let before = self.calls.len();
-        let span = self.span(stand);
+        let apart = prepared.fixed.as_ref().is_some_and(|fixed| fixed.key.apart);
+        let span = self.span(stand, apart);
         if let Some(Fixed { key, spared, geometry, groups, triangles }) = &prepared.fixed {
             let runs = match groups {
                 Some(groups) => {
@@ -90,7 +94,7 @@ impl<'a> ViewOf<'a> {
                 let key = spared.unwrap_or(key);
                 let pipeline = compiled(self.device, key, stats)?;
                 let geometry = geometry.clone();
-                self.calls.push(Call { draw: at, pipeline, geometry, runs, offset, span });
+                self.calls.push(Call { draw: at, pipeline, geometry, runs, offset, span, apart });
             }
         }
         if let Some(Cutting { key }) = &prepared.cutting {
@@ -112,7 +116,7 @@ impl<'a> ViewOf<'a> {
                 let pipeline = compiled(self.device, key, stats)?;
                 let geometry = Geometry::micro(self.device, &displaced)?;
                 let runs = std::iter::once(0..displaced.indices.len() as u32).collect();
-                self.calls.push(Call { draw: at, pipeline, geometry, runs, offset, span });
+                self.calls.push(Call { draw: at, pipeline, geometry, runs, offset, span, apart });
             }
         }
         let added = &self.calls[before..];
@@ -125,7 +129,11 @@ impl<'a> ViewOf<'a> {
     pub fn calls(self, stats: &mut Stats) -> Vec<Call> {
         let mut calls = self.calls;
         if self.request.skips.contains(Skips::DEPTH_FIRST) {
-            let moved = nearest_first(&mut calls);
+            let moved = if calls.iter().any(|call| call.apart) {
+                apart_last(&mut calls)
+            } else {
+                nearest_first(&mut calls)
+            };
             stats.skipped.add(Skips::DEPTH_FIRST, moved as u64);
         }
         calls
@@ -133,8 +141,9 @@ impl<'a> ViewOf<'a> {
 
     /// Distances along the view axis between which all that a draw shows is. Without bounds for what writes a depth of
     /// its own: no order saves a fragment of it.
-    fn span(&self, stand: &Stand) -> [f64; 2] {
-        if self.request.technique.displaces() && !self.request.technique.draws_geometry() {
+    fn span(&self, stand: &Stand, apart: bool) -> [f64; 2] {
+        let writes_depth = self.request.technique.displaces() && !self.request.technique.draws_geometry();
+        if writes_depth && !apart {
             return [f64::NEG_INFINITY, f64::INFINITY];
         }
         let depth = stand.relative_from_object.w_axis.truncate().dot(self.camera.forward());
@@ -165,4 +174,19 @@ fn nearest_first(calls: &mut [Call]) -> usize {
         moved += usize::from(ahead > 0);
     }
     moved
+}
+
+/// Draws what is sorted by its mesh after all else, so that whatever is before it hides it, and nearest first: no order
+/// changes what shows of it. Says how many are now ahead of a draw that comes before them in the scene.
+fn apart_last(calls: &mut [Call]) -> usize {
+    calls.sort_by(|a, b| {
+        (a.apart.cmp(&b.apart)).then(if a.apart { a.span[0].total_cmp(&b.span[0]) } else { Equal })
+    });
+    let mut first = usize::MAX;
+    let mut overtakes = |call: &&Call| {
+        let overtakes = call.draw > first;
+        first = first.min(call.draw);
+        overtakes
+    };
+    calls.iter().rev().filter(|call| overtakes(call)).count()
 }

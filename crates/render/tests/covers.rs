@@ -1,4 +1,4 @@
-//! What meshes hide of one another is left out, and no pixel tells.
+//! What meshes hide of one another is left out, or goes before it is marched, and no pixel tells.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -63,7 +63,8 @@ fn compare(seeds: std::ops::Range<u64>, techniques: &[&str]) {
     });
     let [carved, raised, both] = materials;
     let materials = [carved, raised, Material { double_sided: true, ..both }];
-    let mut hidden = 0;
+    let kinds = [Skips::OCCLUSION, Skips::DEPTH_FIRST];
+    let mut counts = [0; 2];
     for seed in seeds {
         let draws = scattered(&meshes, &materials, seed);
         let mut numbers = Random(seed ^ 0x5eed);
@@ -71,16 +72,21 @@ fn compare(seeds: std::ops::Range<u64>, techniques: &[&str]) {
         let camera = Camera::look_at(eye, DVec3::new(0.0, 0.0, -3.0));
         for technique in techniques {
             let plain = picture(&draws, camera, technique, Skips::NONE).unwrap();
-            let spared = picture(&draws, camera, technique, Skips::OCCLUSION).unwrap();
-            assert_eq!(plain.stats.skipped.of(Skips::OCCLUSION), 0);
-            hidden += spared.stats.skipped.of(Skips::OCCLUSION);
-            assert!(plain.color == spared.color, "{technique}, scene {seed}: colours differ");
-            let same = |a: &Option<Vec<f32>>, b: &Option<Vec<f32>>| a.is_some() && a == b;
-            assert!(same(&plain.aovs.uv, &spared.aovs.uv), "{technique}, scene {seed}: places differ");
-            assert!(same(&plain.aovs.depth, &spared.aovs.depth), "{technique}, scene {seed}: depths differ");
+            for (kind, count) in kinds.into_iter().zip(&mut counts) {
+                let spared = picture(&draws, camera, technique, kind).unwrap();
+                assert_eq!(plain.stats.skipped.of(kind), 0);
+                *count += spared.stats.skipped.of(kind);
+                let case = format!("{technique}, scene {seed}, {kind:?}");
+                assert!(plain.color == spared.color, "{case}: colours differ");
+                let same = |a: &Option<Vec<f32>>, b: &Option<Vec<f32>>| a.is_some() && a == b;
+                assert!(same(&plain.aovs.uv, &spared.aovs.uv), "{case}: places differ");
+                assert!(same(&plain.aovs.depth, &spared.aovs.depth), "{case}: depths differ");
+            }
         }
     }
+    let [hidden, moved] = counts;
     assert!(hidden > 1000, "only {hidden} triangles were hidden");
+    assert!(moved > 10, "only {moved} draws were moved");
 }
 
 #[test]

@@ -57,7 +57,7 @@ fn host_structs_match() {
         "Instance",
     );
     check(
-        layout!(DrawInfo: relative_from_object, object_from_relative, eye, most_heights, most_texels, span, own),
+        layout!(DrawInfo: relative_from_object, object_from_relative, eye, low, high, light_place, light_color, most_heights, most_texels, span, own),
         &relief,
         "DrawInfo",
     );

@@ -14,7 +14,10 @@ const HORIZON_SHADOWS: Replaced = &[
 ];
 
 /// Where rays go through shells: the heights of all solids of the scene for those of one draw.
-const SOLID_HEIGHTS: Replaced = &[("bindings/pyramid.wgsl", "bindings/solid_heights.wgsl")];
+const AMONG_SOLIDS: Replaced = &[
+    ("bindings/pyramid.wgsl", "bindings/solid_heights.wgsl"),
+    ("bindings/draw.wgsl", "bindings/draw_among_solids.wgsl"),
+];
 
 /// A program that cannot be put together.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -56,7 +59,7 @@ pub fn read(path: &str) -> Option<&'static str> {
 /// # Errors
 /// [`ComposeError`] when a file is missing or an import malformed.
 pub fn compose(entry: &str, search: Option<&str>, surface: Option<&str>) -> Result<String, ComposeError> {
-    let replaced = if traces_solids(entry) { SOLID_HEIGHTS } else { &[] };
+    let replaced = if traces_solids(entry) { AMONG_SOLIDS } else { &[] };
     stitch(program_paths(entry, search, surface).iter().map(String::as_str), replaced)
 }
 

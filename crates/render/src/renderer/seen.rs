@@ -1,16 +1,20 @@
 //! What of a scene a view shows: what is in the picture and before the walls, prepared when it is first seen.
 
+use std::sync::Arc;
+
 use glam::{DMat4, DVec3};
 
 use super::Renderer;
 use crate::covers::Candidate;
 use crate::culling::{Culling, Stand};
+use crate::frame_binding::light_infos;
 use crate::geometry::Room;
-use crate::prepare::address;
+use crate::prepare::{InScene, address};
 use crate::shell::SceneSolids;
+use crate::sorting::Sorting;
 use crate::uniforms::DrawInfo;
 use crate::view::{Call, ViewOf};
-use crate::{Camera, Draw, RenderError, Skips, Stats, tally};
+use crate::{Camera, Draw, RenderError, Skips, Stats, TechniqueChoice, tally};
 
 impl Renderer<'_> {
     pub(super) fn culling(&self, camera: &Camera) -> Culling {
@@ -103,6 +107,17 @@ impl Renderer<'_> {
         Ok(own)
     }
 
+    /// How the draws are sorted; nothing where techniques do not march.
+    fn sorted(&mut self) -> Arc<Sorting> {
+        let marches =
+            matches!(self.request.technique, TechniqueChoice::Search(_)) && !self.request.in_shell();
+        let make = || {
+            let sorts = self.request.skips.contains(Skips::DEPTH_FIRST);
+            if marches { Sorting::of(&self.scene.draws, &self.rooms, sorts) } else { Sorting::default() }
+        };
+        Arc::clone(self.sorting.get_or_insert_with(|| Arc::new(make())))
+    }
+
     /// What is drawn of a view, with its places and lights on the device.
     pub(super) fn view(
         &mut self,
@@ -114,6 +129,8 @@ impl Renderer<'_> {
         self.find_walls(camera, &mut culling);
         self.find_covers(camera, &mut culling);
         let numbers = self.place_solids(camera)?;
+        let sorting = self.sorted();
+        let [light, ..] = light_infos(&self.scene, camera.eye)[..] else { return Ok(Vec::new()) };
         let mut view = ViewOf::new(&self.device, camera, &self.request, &culling);
         let stride = self.shared.stride as usize;
         let mut places = Vec::new();
@@ -133,7 +150,9 @@ impl Renderer<'_> {
             let middle = self.rooms.get(&address(&draw.mesh)).map_or(DVec3::ZERO, |room| room.middle);
             if self.draws[at].is_none() {
                 let solids = self.solids.as_ref().map(|solids| (solids, solids.of_draw(at)));
-                let made = self.shared.prepare(&self.device, draw, middle, solids, &self.request, stats)?;
+                let apart = sorting.apart.get(at).copied().unwrap_or_default();
+                let known = InScene { middle, apart, solids };
+                let made = self.shared.prepare(&self.device, draw, known, &self.request, stats)?;
                 self.draws[at] = Some(made);
             }
             let Some(prepared) = &self.draws[at] else { continue };
@@ -141,7 +160,8 @@ impl Renderer<'_> {
             let leeway = prepared.sparing.leeway(camera, &self.request, &stand);
             let offset = places.len() as u32;
             if view.add(at, draw, middle, prepared, &stand, &leeway, offset, stats, warnings)? {
-                let place = DrawInfo::of(stand.relative_from_object, own);
+                let shown = sorting.shown.get(at).copied().unwrap_or_default();
+                let place = DrawInfo::of(stand.relative_from_object, shown, &light, own);
                 let place = prepared.sparing.told(place, &leeway, &self.request);
                 places.extend_from_slice(bytemuck::bytes_of(&place));
                 places.resize(places.len().next_multiple_of(stride), 0);
