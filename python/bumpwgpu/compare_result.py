@@ -88,8 +88,8 @@ class CompareResult:
 
         ``technique``, ``parameters``, ``label``, ``elevation``, ``rays``; ``heights_format``,
         ``cones_format`` (None where none are read), ``memory_bytes`` (texture that it reads);
-        ``time_cpu_ns_per_ray`` and ``time_device_ns_per_ray`` (median, with ``_low`` and ``_high``
-        quartiles; CPU on one core; None where not measured);
+        ``time_cpu_ns_per_ray`` and ``time_device_ns_per_ray`` (median, with ``_low``, the least, and
+        ``_high``, the upper quartile; CPU on one core; None where not measured);
         ``uv_error_median_texels``, ``uv_error_p99_texels``, ``uv_error_p99_bound_texels`` (what the 99th
         percentile of all such rays does not exceed, with 95 % confidence; None for under 299 rays),
         ``uv_error_max_texels``, ``share_above_1_texel``; ``depth_error_p99``, ``depth_error_max``
@@ -178,7 +178,7 @@ class CompareResult:
         -------
         list of dict
             Rows by rising time, each with ``tied_with``: labels of settings whose time cannot be told from
-            its own (quartiles meet, or medians or lower quartiles are within 25 %) and that are on the front
+            its own (ranges meet, or medians or least times are within 25 %) and that are on the front
             too or would be, were the tie broken in their favour; ``rivals``: those of them that are no less
             accurate, so that they may take its place on another machine (one of it and its rivals is on the
             front however ties are broken); and ``certain``: whether it has no rival.

@@ -61,8 +61,8 @@ def compare(
     rays : int, default 8192
         Rays at each elevation of a height map, at most 2**20.
     repeats : int, default 5
-        Timed repeats, taken in turns over all settings; medians and quartiles are reported. What another
-        setting beats by far at every elevation is timed twice.
+        Timed repeats, taken in turns over all settings; the least, the median and the upper quartile are
+        reported. What another setting beats by far at every elevation is timed twice.
     seed : int, default 0
         Fixes rays and lights.
     progress : callable or None
@@ -88,7 +88,8 @@ def compare(
     of the relief above the surface and more than a texel short of the true one. Either is no answer at
     all, so a setting with more than 0.1 % of them is neither on the front nor recommended.
 
-    Times whose quartiles meet, or whose medians or lower quartiles differ by less than 25 %, are a tie.
+    Times whose ranges, from the least to the upper quartile, meet, or whose medians or least differ by less
+    than 25 %, are a tie.
     Which settings the sweep tries depends on errors and texture reads, not on time, so it tries the same
     ones on every machine.
 

@@ -352,7 +352,7 @@ impl SegmentReference {
     }
 }
 
-/// A measured setting: label, time per ray (lower quartile, median, upper quartile), p99 error in
+/// A measured setting: label, time per ray (least, median, upper quartile), p99 error in
 /// texels, share of rays that fail, bytes of texture.
 type Measured = (String, [f64; 3], f64, f64, f64);
 
