@@ -179,3 +179,53 @@ def test_models_of_others_are_those_of_displacement(assets: Path, path: str, bas
         print(f"{path} {base}: {pixels} pixels, {wrong} astray")
         assert pixels > 500
         assert wrong <= allowed
+
+
+def slivers(seed: int) -> bw.Mesh:
+    """Long thin triangles, normals at their corners far apart: their prisms are folded over themselves."""
+    random = np.random.default_rng(seed)
+
+    def unit(vector: np.ndarray) -> np.ndarray:
+        return np.asarray(vector / np.linalg.norm(vector))
+
+    places, normals = [], []
+    for _ in range(24):
+        corner, along = random.uniform(-0.7, 0.7, 3), unit(random.normal(size=3))
+        beside = unit(np.cross(along, random.normal(size=3)))
+        places += [corner, corner + 0.02 * beside, corner + 0.5 * along]
+        normals += [unit(unit(np.cross(beside, along)) + 1.5 * random.normal(size=3)) for _ in range(3)]
+    uvs = np.tile([(0.0, 0.0), (0.02, 0.0), (0.0, 0.5)], (24, 1))
+    return bw.Mesh(
+        np.array(places, np.float32),
+        np.arange(72, dtype=np.uint32).reshape(-1, 3),
+        uvs.astype(np.float32),
+        normals=np.array(normals, np.float32),
+    )
+
+
+@pytest.mark.parametrize("base", [0.0, 1.0])
+def test_what_is_seen_of_folded_prisms_is_within_the_relief_of_a_triangle(base: float) -> None:
+    mesh, scale = slivers(0), 0.1
+    frame = bw.render(
+        mesh,
+        bw.Material(height=bw.HeightMap(BUMPS.array, scale=scale, base=base), double_sided=True),
+        camera=bw.Camera.look_at((0.4, 0.5, 2.6), (0, 0, 0)),
+        technique="exact",
+        silhouettes=True,
+        size=SIZE,
+        aovs=("position", "mask"),
+        shadows=False,
+    )
+    seen = frame.aovs["position"][frame.aovs["mask"] == 1].astype(float)
+    assert len(seen) > 200
+    steps = np.arange(101) / 100
+    # Triangles are thin: three lines along each are nearly all of it.
+    weights = np.array([(a * (1 - b), a * b, 1 - a) for a in steps for b in (0.0, 0.5, 1.0)])
+
+    def farthest(positions: np.ndarray) -> float:
+        points = np.concatenate([weights @ positions[triangle] for triangle in mesh.indices])
+        nearest = [np.sqrt(((points - place) ** 2).sum(1).min()) for place in seen]
+        return float(np.max(nearest))
+
+    assert farthest(mesh.positions.astype(float)) < 1.15 * scale
+    assert farthest(mesh.positions.astype(float) + 0.2) > 1.5 * scale, "negative control"

@@ -121,32 +121,3 @@ fn prism_span(prism: Prism, low: f32, high: f32) -> PrismSpan {
     span = cross_side(prism.p1, prism.p2, prism.n1, prism.n2, one, two, low, high, 1u, span);
     return cross_side(prism.p2, prism.p0, prism.n2, prism.n0, two, zero, low, high, 2u, span);
 }
-
-// The point of the prism at `t` of the ray, by Newton's method from a guess.
-fn prism_point(prism: Prism, t: f32, guess: PrismPoint) -> PrismPoint {
-    var found = guess;
-    let e1 = prism.p1 - prism.p0;
-    let e2 = prism.p2 - prism.p0;
-    let m1 = prism.n1 - prism.n0;
-    let m2 = prism.n2 - prism.n0;
-    for (var i = 0u; i < 3u; i++) {
-        let normal = prism.n0 + found.weights.x * m1 + found.weights.y * m2;
-        let off = prism.p0 + found.weights.x * e1 + found.weights.y * e2 + found.rise * normal - vec3f(0.0, 0.0, t);
-        let along_1 = e1 + found.rise * m1;
-        let along_2 = e2 + found.rise * m2;
-        let across = cross(along_1, along_2);
-        let volume = dot(across, normal);
-        if !(abs(volume) > 1e-30) {
-            break;
-        }
-        let step = vec3f(dot(off, cross(along_2, normal)), dot(off, cross(normal, along_1)), dot(off, across)) / volume;
-        found.weights -= step.xy;
-        found.rise -= step.z;
-    }
-    found.t = t;
-    return found;
-}
-
-fn mix_points(a: PrismPoint, b: PrismPoint, share: f32) -> PrismPoint {
-    return PrismPoint(mix(a.weights, b.weights, share), mix(a.rise, b.rise, share), mix(a.t, b.t, share));
-}

@@ -20,6 +20,8 @@ const CREASE: f32 = 1.0;
 // So deep below the surface, in heights, a ray may come from the next triangle of a sheet without having met it there:
 // by as much chords are off. Deeper it is on the other side.
 const ROUNDED_BELOW: f32 = 2e-3;
+// Heights above the highest and below the lowest that a hit may be: far more than chords are off.
+const BEYOND_RELIEF: f32 = 0.1;
 // Cells ahead that tell whether a ray goes down to the surface or comes out of it.
 const NEXT: f32 = 0.1;
 
@@ -116,7 +118,11 @@ fn search_prism(ray: ShellRay, crossing: Crossing, best: ShellHit) -> ShellHit {
         if !goes_on_to_next {
             // Where normals meet before the relief ends the shell is folded: there the front of the surface looks down.
             let from_behind = inside != (prism_volume(prism, here) < 0.0);
-            if !from_behind || sees_inside || ray.for_shadow {
+            let met = !from_behind || sees_inside || ray.for_shadow;
+            // Where normals nearly vanish chords are not near the curve: no relief is so high or so low.
+            let level = in_texture(here, uvs, prism).z;
+            let of_relief = abs(level - 0.5) <= 0.5 + BEYOND_RELIEF + slack;
+            if met && of_relief && is_of_prism(prism, here) {
                 result.found = true;
                 result.inside = from_behind;
                 result.status = 0u;

@@ -1,6 +1,6 @@
 // Rays into the prisms of a shell.
 #import "bindings/solids.wgsl"
-#import "lib/prism.wgsl"
+#import "lib/prism_point.wgsl"
 #import "shading/shell_ray.wgsl"
 
 // The part of a ray in one prism, if there is any.

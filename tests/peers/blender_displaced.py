@@ -262,7 +262,7 @@ def blenders(case: Case, folder: Path) -> Picture:
 def ours(case: Case, **options: object) -> Picture:
     """Our picture of the case."""
     frame = bw.render(
-        [bw.Instance(case.mesh, bw.Material(height=case.heights), case.place)],
+        [bw.Instance(case.mesh, bw.Material(height=case.heights, double_sided=True), case.place)],
         camera=case.camera,
         lights=[bw.Light.directional([-way for way in SUN])],
         size=SIZE,
