@@ -20,7 +20,7 @@ FEW = [("normal", False), ("relief", False), ("exact", False), ("exact", True), 
 # What these do depends on the angle of view, which they take in the mesh's own space (docs/scenes.md).
 BY_ANGLE = ("parallax_limited", "steep_linear", "steep_exponential")
 SCALES = [(-1.2, 0.6, 1.6), (0.8, 1.1, -0.7), (1.3, 0.7, 0.5), (-0.9, -1.2, -2.0)]
-OUTPUTS = ("uv", "depth", "normal", "shadow", "mask", "height")
+OUTPUTS = ("uv", "depth", "position", "normal", "shadow", "mask", "height")
 TEXELS = 64
 
 
@@ -124,6 +124,18 @@ def test_every_technique_follows_every_transform(
     stretched(technique, silhouettes, scale)
 
 
+def sorted_by(frame: bw.Frame, instance: bw.Instance) -> np.ndarray:
+    """Depths of an object alone, none beyond where the ray leaves the box around it and its relief."""
+    mesh, relief = instance.mesh, instance.material.height.scale
+    ends = np.concatenate([mesh.positions + mesh.normals * side * relief for side in (-1, 1)])
+    inside = np.linalg.inv(instance.world_from_object)
+    eye = inside[:3, :3] @ (0.9, 0.7, 1.9) + inside[:3, 3]
+    ray = frame.aovs["position"] @ inside[:3, :3].T + inside[:3, 3] - eye
+    leaves = (np.where(ray > 0, ends.max(0), ends.min(0)) - eye) / np.where(ray == 0, 1e-30, ray)
+    depth = frame.aovs["depth"] * np.minimum(leaves.min(axis=2), 1.0)
+    return np.where(frame.aovs["mask"] > 0, depth, np.inf)
+
+
 def test_a_scene_is_its_objects_one_before_the_other() -> None:
     """Objects with albedo, heights, normals and highlights of their own, two with the same mesh; where they
     are in front they look as they do alone."""
@@ -145,7 +157,7 @@ def test_a_scene_is_its_objects_one_before_the_other() -> None:
         option: dict[str, Any] = {"technique": technique, "silhouettes": silhouettes}
         whole = draw(scene, shadows=False, skip=False, **option)
         alone = [draw(one, shadows=False, skip=False, **option) for one in scene]
-        depth = np.stack([np.where(f.aovs["mask"] > 0, f.aovs["depth"], np.inf) for f in alone])
+        depth = np.stack([sorted_by(f, one) for f, one in zip(alone, scene, strict=True)])
         front = depth.argmin(0)
         shown = np.isfinite(depth.min(0))
         composed = np.take_along_axis(np.stack([f.color for f in alone]), front[None, ..., None], 0)[0]
