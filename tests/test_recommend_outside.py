@@ -141,10 +141,12 @@ def check(
     said = f"{height_map!r} on {device}, {budget:g} texels: {advice.reason}"
     print(f"{said}\n    unseen: p99 {np.quantile(errors, 0.99):.4g} texels, {100 * failing:.3g} % failing")
     # No more rays beyond the budget than 1 %, nor failing than the bound, but for chance (three deviations).
-    for share, bound in (
-        ((errors > max(budget, 1e-3)).mean(), 0.01),
-        (failing, max(advice.bound_failure_rate, 1e-3)),
-    ):
+    # The judge also counts hits that are late in the dive that they are found in, which are errors and no
+    # failures: searches that promise nothing are held to the budget alone.
+    held = [((errors > max(budget, 1e-3)).mean(), 0.01)]
+    if advice.technique not in LOOSE:
+        held.append((failing, max(advice.bound_failure_rate, 1e-3)))
+    for share, bound in held:
         assert share <= bound + 3.0 * np.sqrt(bound * (1.0 - bound) / RAYS), said
 
 
