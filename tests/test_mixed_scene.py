@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-from pathlib import Path
+from collections.abc import Callable
 from types import ModuleType
 
 import numpy as np
@@ -13,7 +11,6 @@ from numpy.typing import NDArray
 
 import bumpwgpu as bw
 
-EXAMPLE = Path(__file__).resolve().parent.parent / "examples" / "mixed_scene.py"
 SIZE = (320, 180)
 #: The documented bound: texels of the height map, and pixels.
 TEXELS, PIXELS = 0.125, 0.25
@@ -22,13 +19,8 @@ pytestmark = pytest.mark.usefixtures("gpu")
 
 
 @pytest.fixture(scope="module")
-def example() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("mixed_scene", EXAMPLE)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["mixed_scene"] = module
-    spec.loader.exec_module(module)
+def example(load_example: Callable[[str], ModuleType]) -> ModuleType:
+    module = load_example("mixed_scene")
     # Made once, so that each map is baked once.
     things = module.Things()
     module.Things = lambda: things

@@ -70,11 +70,8 @@ fn show(name: &str, plain: &Mesh, detail: &Mesh, space: NormalSpace) {
     println!("{name:<20} {:>7.1} ({:>5.1})", clock * 1e3, (cpu_seconds() - spent) * 1e3 / RUNS as f64);
 }
 
-/// Of all threads so far; Linux only.
+/// Of all threads so far.
 fn cpu_seconds() -> f64 {
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    let after = stat.rsplit(')').next().unwrap_or_default();
-    let fields: Vec<f64> = after.split_whitespace().filter_map(|field| field.parse().ok()).collect();
-    // The state letter is dropped by the parse: user and system time are fields 11 and 12 after it, in ticks.
-    if fields.len() > 11 { (fields[10] + fields[11]) / 100.0 } else { f64::NAN }
+    let now = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+    now.tv_sec as f64 + 1e-9 * now.tv_nsec as f64
 }

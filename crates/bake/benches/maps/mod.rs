@@ -93,11 +93,8 @@ fn sines(periods: f64) -> HeightField {
 
 /// Seconds that all threads of this process have run.
 pub fn cpu_seconds() -> f64 {
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    let after = stat.rsplit(')').next().unwrap_or_default();
-    let fields: Vec<f64> = after.split_whitespace().filter_map(|field| field.parse().ok()).collect();
-    // The state letter is dropped by the parse: user and system time are fields 11 and 12 after it, in ticks.
-    if fields.len() > 11 { (fields[10] + fields[11]) / 100.0 } else { f64::NAN }
+    let now = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+    now.tv_sec as f64 + 1e-9 * now.tv_nsec as f64
 }
 
 /// Clock and processor seconds of a run, and its result.
