@@ -150,15 +150,13 @@ def test_grazing_views_are_those_of_displacement(name: str) -> None:
         nothing_astray(name, bw.Camera.look_at(eye, target, up=(0, 0, 1)), 300)
 
 
-# Height of the relief, in shares of the model's size, and how many pixels of a picture may be astray: on
-# rancid_geometry normals at the corners of slivers are up to 168 degrees apart, and carved into those the
-# surface runs through itself.
+# Height of the relief, in shares of the model's size. Where surfaces run through themselves, as on slivers of
+# rancid_geometry, micro-polygons are no judge: rays in double precision are (crates/render/tests/models.rs).
 MODELS = {
-    "obj/mikktspace/doomcone_smooth.obj": (0.02, 0),
-    "obj/mikktspace/rancid_geometry.obj": (0.01, 1),
-    "obj/meshoptimizer/pirate.obj": (0.01, 0),
-    "obj/tinyobjloader/map-bump.obj": (0.02, 0),
-    "obj/trimesh/fuze.obj": (0.02, 0),
+    "obj/mikktspace/doomcone_smooth.obj": 0.02,
+    "obj/meshoptimizer/pirate.obj": 0.01,
+    "obj/tinyobjloader/map-bump.obj": 0.02,
+    "obj/trimesh/fuze.obj": 0.02,
 }
 
 
@@ -166,7 +164,7 @@ MODELS = {
 @pytest.mark.parametrize("path", MODELS)
 @pytest.mark.parametrize("base", [0.0, 1.0])
 def test_models_of_others_are_those_of_displacement(assets: Path, path: str, base: float) -> None:
-    share, allowed = MODELS[path]
+    share = MODELS[path]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", bw.BumpWarning)
         mesh = bw.Mesh.open(assets / path)
@@ -178,7 +176,7 @@ def test_models_of_others_are_those_of_displacement(assets: Path, path: str, bas
         pixels, wrong = judged(mesh, heights, bw.Camera.look_at(eye, middle))
         print(f"{path} {base}: {pixels} pixels, {wrong} astray")
         assert pixels > 500
-        assert wrong <= allowed
+        assert wrong == 0
 
 
 def slivers(seed: int) -> bw.Mesh:

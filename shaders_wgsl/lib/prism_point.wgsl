@@ -8,28 +8,46 @@ const OFF: f32 = 0.1;
 // Share of the way to the point that is rounded.
 const ROUNDED: f32 = 1e-5;
 
-// The point of the prism at `t` of the ray, by Newton's method from a guess.
-fn prism_point(prism: Prism, t: f32, guess: PrismPoint) -> PrismPoint {
-    var found = guess;
-    let e1 = prism.p1 - prism.p0;
-    let e2 = prism.p2 - prism.p0;
+// How the place of a point changes with its weights and its rise: a row for each axis.
+fn prism_slopes(prism: Prism, point: PrismPoint) -> mat3x3f {
     let m1 = prism.n1 - prism.n0;
     let m2 = prism.n2 - prism.n0;
+    return transpose(mat3x3f(
+        prism.p1 - prism.p0 + point.rise * m1,
+        prism.p2 - prism.p0 + point.rise * m2,
+        prism.n0 + point.weights.x * m1 + point.weights.y * m2,
+    ));
+}
+
+// A point of a prism, relative to the ray's origin.
+fn prism_place(prism: Prism, point: PrismPoint) -> vec3f {
+    let w = vec3f(1.0 - point.weights.x - point.weights.y, point.weights);
+    return w.x * (prism.p0 + point.rise * prism.n0) + w.y * (prism.p1 + point.rise * prism.n1)
+        + w.z * (prism.p2 + point.rise * prism.n2);
+}
+
+// The point of the prism on the ray, by Newton's method from a guess: at `t`; or, unless `across` is zero, where the step from
+// the guess is perpendicular to it, in weights and rise. So the ray can be followed around a fold of the prism, where it
+// goes on in weights and rise but turns back in t.
+fn prism_point(prism: Prism, t: f32, guess: PrismPoint, across: vec3f) -> PrismPoint {
+    var found = guess;
+    let by_t = all(across == vec3f(0.0));
     for (var i = 0u; i < 3u; i++) {
-        let normal = prism.n0 + found.weights.x * m1 + found.weights.y * m2;
-        let off = prism.p0 + found.weights.x * e1 + found.weights.y * e2 + found.rise * normal - vec3f(0.0, 0.0, t);
-        let along_1 = e1 + found.rise * m1;
-        let along_2 = e2 + found.rise * m2;
-        let across = cross(along_1, along_2);
-        let volume = dot(across, normal);
+        let slopes = prism_slopes(prism, found);
+        var off = prism_place(prism, found) - vec3f(0.0, 0.0, t);
+        let moved = vec3f(found.weights - guess.weights, found.rise - guess.rise);
+        let last = select(across, slopes[2], by_t);
+        off.z = select(dot(across, moved), off.z, by_t);
+        let ahead = cross(slopes[0], slopes[1]);
+        let volume = dot(ahead, last);
         if !(abs(volume) > 1e-30) {
             break;
         }
-        let step = vec3f(dot(off, cross(along_2, normal)), dot(off, cross(normal, along_1)), dot(off, across)) / volume;
+        let step = (off.x * cross(slopes[1], last) + off.y * cross(last, slopes[0]) + off.z * ahead) / volume;
         found.weights -= step.xy;
         found.rise -= step.z;
     }
-    found.t = t;
+    found.t = select(prism_place(prism, found).z, t, by_t);
     return found;
 }
 
@@ -37,10 +55,8 @@ fn prism_point(prism: Prism, t: f32, guess: PrismPoint) -> PrismPoint {
 // out of a prism that is folded over itself it may be outside, and the method may end anywhere.
 fn is_of_prism(prism: Prism, point: PrismPoint) -> bool {
     let w = vec3f(1.0 - point.weights.x - point.weights.y, point.weights);
-    let at = w.x * (prism.p0 + point.rise * prism.n0) + w.y * (prism.p1 + point.rise * prism.n1)
-        + w.z * (prism.p2 + point.rise * prism.n2);
     let size = length(prism.p1 - prism.p0) + length(prism.p2 - prism.p0);
-    let near = length(at - vec3f(0.0, 0.0, point.t)) <= OFF * size + ROUNDED * abs(point.t);
+    let near = length(prism_place(prism, point) - vec3f(0.0, 0.0, point.t)) <= OFF * size + ROUNDED * abs(point.t);
     return near && min(w.x, min(w.y, w.z)) >= -OUTSIDE;
 }
 

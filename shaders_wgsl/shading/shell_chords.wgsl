@@ -34,7 +34,7 @@ fn search_prism(ray: ShellRay, crossing: Crossing, best: ShellHit) -> ShellHit {
     var result = best;
     if crossing.own || span.enter.t < ray.first {
         let share = clamp((ray.first - span.enter.t) / (span.leave.t - span.enter.t), 0.0, 1.0);
-        span.enter = prism_point(prism, ray.first, mix_points(span.enter, span.leave, share));
+        span.enter = prism_point(prism, ray.first, mix_points(span.enter, span.leave, share), vec3f(0.0));
     }
     let size = height_info.size;
     var enter = in_texture(span.enter, uvs, prism);
@@ -45,7 +45,26 @@ fn search_prism(ray: ShellRay, crossing: Crossing, best: ShellHit) -> ShellHit {
     let leave = in_texture(span.leave, uvs, prism);
     // Nearer to the surface than this, in heights, it cannot be told on which side of it the ray comes in.
     let slack = min(2.0 * (ray.rounding + SHELL_ROUNDING * abs(span.enter.t)) / height_info.scale, ON_SURFACE);
-    let halfway = prism_point(prism, mix(span.enter.t, span.leave.t, 0.5), mix_points(span.enter, span.leave, 0.5));
+    // Where normals meet before the relief ends the shell is folded: there the front of the surface looks down. A ray that comes
+    // in on one side of a fold and leaves on the other turns back at it, unless it was out of the prism in between.
+    let between = mix_points(span.enter, span.leave, 0.5);
+    var halfway = prism_point(prism, between.t, between, vec3f(0.0));
+    var across = vec3f(0.0);
+    var turns_back = false;
+    if (prism_volume(prism, span.enter) < 0.0) != (prism_volume(prism, span.leave) < 0.0) {
+        let way = vec3f(span.leave.weights - span.enter.weights, span.leave.rise - span.enter.rise);
+        let along = way / vec3f(1.0, 1.0, height_info.scale * height_info.scale);
+        let around = prism_point(prism, between.t, between, along);
+        let w = vec3f(1.0 - around.weights.x - around.weights.y, around.weights);
+        turns_back = is_of_prism(prism, around) && min(w.x, min(w.y, w.z)) >= 0.0;
+        if turns_back {
+            across = along;
+            halfway = around;
+        }
+    }
+    let slopes = prism_slopes(prism, halfway);
+    // Turning back in t and turning inside out, the front stays the front.
+    let turned = dot(cross(slopes[0], slopes[1]), across) < 0.0;
     let off = in_texture(halfway, uvs, prism) - 0.5 * (enter + leave);
     let sag = max(length(off.xy * size) / SAG.x, abs(off.z) / SAG.y);
     let chords = clamp(ceil(sqrt(min(sag, 1e6))), 1.0, MAX_CHORDS);
@@ -66,7 +85,7 @@ fn search_prism(ray: ShellRay, crossing: Crossing, best: ShellHit) -> ShellHit {
             if chord < chords {
                 let share = chord / chords;
                 let guess = mix_points(span.enter, span.leave, share);
-                there = prism_point(prism, mix(span.enter.t, span.leave.t, share), guess);
+                there = prism_point(prism, mix(span.enter.t, span.leave.t, share), guess, across);
                 end = in_texture(there, uvs, prism);
             }
         }
@@ -109,16 +128,16 @@ fn search_prism(ray: ShellRay, crossing: Crossing, best: ShellHit) -> ShellHit {
             here = there;
             start = end;
         } else {
-            here = prism_point(prism, mix(here.t, there.t, tau), mix_points(here, there, tau));
+            here = prism_point(prism, mix(here.t, there.t, tau), mix_points(here, there, tau), across);
             start = mix(start, end, tau);
         }
-        if here.t >= best.t || (goes_on_to_next && chord >= chords) {
+        if (here.t >= best.t && !turns_back) || (goes_on_to_next && chord >= chords) {
             break;
         }
         if !goes_on_to_next {
-            // Where normals meet before the relief ends the shell is folded: there the front of the surface looks down.
-            let from_behind = inside != (prism_volume(prism, here) < 0.0);
-            let met = !from_behind || sees_inside || ray.for_shadow;
+            let from_behind = inside != select(prism_volume(prism, here) < 0.0, turned, turns_back);
+            let ahead = !turns_back || (here.t < result.t && here.t > ray.first);
+            let met = ahead && (!from_behind || sees_inside || ray.for_shadow);
             // Where normals nearly vanish chords are not near the curve: no relief is so high or so low.
             let level = in_texture(here, uvs, prism).z;
             let of_relief = abs(level - 0.5) <= 0.5 + BEYOND_RELIEF + slack;
@@ -130,7 +149,10 @@ fn search_prism(ray: ShellRay, crossing: Crossing, best: ShellHit) -> ShellHit {
                 result.face = crossing.face;
                 result.strip = PRISM;
                 result.weights = here.weights;
-                break;
+                // Farther around a fold there may be something nearer.
+                if !turns_back {
+                    break;
+                }
             }
             inside = !inside;
             leaves = !inside;

@@ -24,11 +24,7 @@ fn in_texture(point: PrismPoint, uvs: mat3x2f, prism: Prism) -> vec3f {
 
 // How much room the prism takes around a point, for steps in weights and rise; negative where it is turned inside out.
 fn prism_volume(prism: Prism, point: PrismPoint) -> f32 {
-    let m1 = prism.n1 - prism.n0;
-    let m2 = prism.n2 - prism.n0;
-    let along_1 = prism.p1 - prism.p0 + point.rise * m1;
-    let along_2 = prism.p2 - prism.p0 + point.rise * m2;
-    return dot(cross(along_1, along_2), prism.n0 + point.weights.x * m1 + point.weights.y * m2);
+    return determinant(prism_slopes(prism, point));
 }
 
 // Where a ray goes through a prism before `last`.

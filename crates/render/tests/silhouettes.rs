@@ -7,7 +7,7 @@
 
 mod common;
 
-use common::agree::{agreement, as_truth, from, lost, row, show};
+use common::agree::{agreement, as_truth, disproved, from, lost, row, show};
 use common::shapes::{SIZE, heights, picture, scene_picture, shapes};
 use common::truth::Truth;
 use glam::{DVec3, Vec2, Vec3};
@@ -40,11 +40,8 @@ fn relief_in_the_shell_is_the_displaced_surface() {
     }
 }
 
-/// A cube with one normal a corner: on its sides normals are up to 109 degrees apart, and a ray may go through the prism over
-/// a whole side more than once.
-#[test]
-fn normals_may_fan_out() {
-    let Some(device) = common::device() else { return };
+/// A cube with one normal a corner: on its sides normals are up to 109 degrees apart.
+fn smooth_cube() -> Mesh {
     let at = |bits: u32| Vec3::from([0, 1, 2].map(|axis| if bits >> axis & 1 == 0 { -0.4 } else { 0.4 }));
     let (mut places, mut normals, mut uvs) = (Vec::new(), Vec::new(), Vec::new());
     let mut triangles = Vec::new();
@@ -61,20 +58,71 @@ fn normals_may_fan_out() {
         }
         triangles.extend([[first, first + 1, first + 3], [first, first + 3, first + 2]]);
     }
-    let mesh = common::mesh_of(&places, &normals, &uvs, &triangles);
+    common::mesh_of(&places, &normals, &uvs, &triangles)
+}
+
+/// A square whose normals lean sideways, 63 degrees at its corners: the sides of its prisms are twisted.
+fn swirl() -> Mesh {
+    let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(Vec2::from);
+    let places = corners.map(|uv| Vec3::new(uv.x - 0.5, 0.5 - uv.y, 0.0));
+    let normals = places.map(|p| (Vec3::Z + 8.0_f32.sqrt() * Vec3::new(-p.y, p.x, 0.0)).normalize());
+    common::mesh_of(&places, &normals, &corners, &[[2, 3, 1], [2, 1, 0]])
+}
+
+/// How many pixels' rays go through one side of a prism twice.
+fn twice(mesh: &Mesh, camera: &Camera, highest: f64) -> usize {
+    let [corner, right, down] = camera.pixel_directions(SIZE, 0);
+    let crossings = |way: DVec3, ends: [u32; 2]| {
+        let [a, b] = ends.map(|end| mesh.positions[end as usize].as_dvec3() - camera.eye);
+        let [up_a, up_b] = ends.map(|end| mesh.normals[end as usize].as_dvec3());
+        let (constant, bend) = (way.dot(a.cross(b)), way.dot(up_a.cross(up_b)));
+        let slope = way.dot(a.cross(up_b) + up_a.cross(b));
+        let root = (slope * slope - 4.0 * bend * constant).sqrt();
+        let inside = |rise: &f64| {
+            let (from, to) = (a + *rise * up_a, b + *rise * up_b);
+            let edge = (to - from).reject_from(way);
+            let share = -from.reject_from(way).dot(edge) / edge.length_squared();
+            (0.0..highest).contains(rise) && (0.0..1.0).contains(&share)
+        };
+        [-root, root].map(|root| (root - slope) / (2.0 * bend)).iter().filter(|rise| inside(rise)).count()
+    };
+    let way = |at: u32| {
+        let (x, y) = (f64::from(at % SIZE[0]) + 0.5, f64::from(at / SIZE[0]) + 0.5);
+        corner + right * x + down * y
+    };
+    let any = |at: &u32| {
+        let sides = mesh.indices.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+        sides.into_iter().any(|ends| crossings(way(*at), ends) == 2)
+    };
+    (0..SIZE[0] * SIZE[1]).filter(any).count()
+}
+
+/// Where sides of prisms are twisted a ray may go through the prism over a whole triangle more than once: without the cut
+/// into pieces 46 and 19 pixels of the swirl are lost. The sides over the cube's edges are plane.
+#[test]
+fn normals_may_fan_out() {
+    let Some(device) = common::device() else { return };
     let texels = [48, 48];
-    for base in [0.0, 1.0] {
-        let (field, camera) = (heights(texels, 0.08, base), from([1.0, 0.9, 1.4]));
-        let judge = Truth::new(&mesh, &field);
+    let judged = |name: &str, mesh: &Mesh, scale: f32, base: f32, eye: [f64; 3]| {
+        let (field, camera) = (heights(texels, scale, base), from(eye));
+        let judge = Truth::new(mesh, &field);
         let truth = judge.picture(&camera, SIZE);
-        let frame = picture(&device, &mesh, &field, camera, "exact", true);
-        show(&frame, &format!("smooth_cube_{base}"));
+        let frame = picture(&device, mesh, &field, camera, "exact", true);
+        show(&frame, &format!("{name}_{base}_{}", eye[0]));
         let found = agreement(&frame, &truth, &camera, texels);
-        row("smooth cube", base, &found);
-        assert!(found.both > 1500 && found.outline_off.is_empty(), "{base}: {found:?}");
-        assert!(found.place_p99 < 0.1 && found.far < 0.002, "{base}: {found:?}");
-        assert_eq!(lost(&found.astray, &frame, &judge, &camera), 0, "{base}: {found:?}");
+        row(name, base, &found);
+        assert!(found.both > 1500 && found.outline_off.is_empty(), "{name} {base}: {found:?}");
+        assert!(found.place_p99 < 0.1 && found.far < 0.002, "{name} {base}: {found:?}");
+        assert_eq!(lost(&found.astray, &frame, &judge, &camera), 0, "{name} {base}: {found:?}");
+        twice(mesh, &camera, f64::from(scale))
+    };
+    for base in [0.0, 1.0] {
+        assert_eq!(judged("smooth cube", &smooth_cube(), 0.08, base, [1.0, 0.9, 1.4]), 0);
     }
+    let views = [[0.9, -0.9, 0.6], [0.2, 0.3, 1.5]];
+    let twice: Vec<usize> = views.map(|eye| judged("swirl", &swirl(), 0.2, 0.0, eye)).into();
+    println!("{twice:?} rays go through a side of the swirl twice");
+    assert!(twice.iter().sum::<usize>() > 20, "{twice:?}");
 }
 
 /// A relief whose rays are straight in a frame of their own must be found out, and one a tenth too deep.
@@ -146,12 +194,26 @@ fn the_near_plane_cuts_meshes_open() {
             show(&frame, &format!("near_{name}_{cut}"));
             let found = agreement(&frame, &truth, &camera, texels);
             row(&format!("{name}, cut at {cut}"), 0.0, &found);
-            // Crests that stand out of the cut by less than the micro-triangles of the truth are off.
+            // Crests that stand out of the cut by less than the micro-triangles of the truth are met by finer rays.
             let odd = [found.outline_off.as_slice(), &found.astray].concat();
-            assert!(odd.len() < 5 && found.both > 200, "{name} {cut}: {found:?}");
-            assert_eq!(lost(&odd, &frame, &judge, &camera), 0, "{name} {cut}: {found:?}");
+            assert!(found.both > 200, "{name} {cut}: {found:?}");
+            assert_eq!(disproved(&odd, &frame, &judge, &camera), 0, "{name} {cut}: {found:?}");
         }
     }
+}
+
+/// What is two pixels aside is not what finer rays meet.
+#[test]
+fn finer_rays_notice_what_is_off() {
+    let Some(device) = common::device() else { return };
+    let (_, mesh, texels, eye) = shapes().into_iter().next().unwrap();
+    let (field, camera) = (heights(texels, 0.08, 0.0), from(eye));
+    let judge = Truth::new(&mesh, &field);
+    let frame = |camera| picture(&device, &mesh, &field, camera, "exact", true);
+    let aside = Camera { target: camera.target + 0.02 * DVec3::X, ..camera };
+    let some: Vec<usize> = (0..20).map(|k| (SIZE[0] * 50 + 56 + k) as usize).collect();
+    assert_eq!(disproved(&some, &frame(camera), &judge, &camera), 0);
+    assert!(disproved(&some, &frame(aside), &judge, &camera) > 10);
 }
 
 #[test]

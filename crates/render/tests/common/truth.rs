@@ -2,7 +2,8 @@
 //!
 //! Knows nothing of tessellation in pixels nor of shells. Each triangle is cut into a tree of micro-triangles a
 //! quarter of a texel wide, with a box around each branch; what a ray meets there is polished by Newton's
-//! method on the surface itself, P + scale (h - base) N / |N|. Where triangles along an edge differ in UVs or normals,
+//! method on the surface itself, P + scale (h - base) N / |N|. What stands out of micro-triangles, crests between texels, is
+//! met by rays that look more finely. Where triangles along an edge differ in UVs or normals,
 //! strips close what lies between them (`bridges.rs`).
 #![allow(dead_code)]
 
@@ -34,6 +35,8 @@ struct Face {
     normals: [DVec3; 3],
     uvs: [DVec2; 3],
     depth: u32,
+    /// The largest box around a micro-triangle, corner to corner: the surface stands out of them by less.
+    largest: f64,
     /// Low and high corner of each branch; children of `i` are `4 i + 1` to `4 i + 4`.
     boxes: Vec<[DVec3; 2]>,
 }
@@ -83,6 +86,9 @@ impl Face {
                 add(self.build(field, 4 * at + 1 + child, corners, depth - 1));
             }
         }
+        if depth == 0 {
+            self.largest = self.largest.max((around[1] - around[0]).length());
+        }
         let slack = DVec3::splat(1e-12);
         self.boxes[at] = [around[0] - slack, around[1] + slack];
         self.boxes[at]
@@ -112,6 +118,7 @@ impl<'a> Truth<'a> {
                     normals: corners.map(|at| mesh.normals[at].as_dvec3()),
                     uvs,
                     depth,
+                    largest: 0.0,
                     boxes: vec![[DVec3::ZERO; 2]; ((4_usize << (2 * depth)) - 1) / 3],
                 };
                 face.build(field, 0, [DVec3::X, DVec3::Y, DVec3::Z], depth);
@@ -123,17 +130,21 @@ impl<'a> Truth<'a> {
 
     /// The nearest place where the ray comes down through the surface.
     pub fn first_hit(&self, origin: DVec3, direction: DVec3) -> Option<Hit> {
-        self.first(origin, direction, false)
+        self.first(origin, direction, false, 0)
     }
 
-    fn first(&self, origin: DVec3, direction: DVec3, to_light: bool) -> Option<Hit> {
+    /// `halvings`: how often the sides of micro-triangles are halved, which is done for the ray alone.
+    fn first(&self, origin: DVec3, direction: DVec3, to_light: bool, halvings: u32) -> Option<Hit> {
         let inverse = direction.recip();
         let mut nearest: Option<Hit> = None;
         let mut stack = Vec::new();
         for face in &self.faces {
-            stack.push((0, [DVec3::X, DVec3::Y, DVec3::Z], face.depth));
+            let wider = if halvings > 0 { DVec3::splat(face.largest) } else { DVec3::ZERO };
+            stack.push((0, [DVec3::X, DVec3::Y, DVec3::Z], face.depth + halvings));
             while let Some((at, corners, depth)) = stack.pop() {
-                if !enters(face.boxes[at], origin, inverse, nearest.map_or(f64::INFINITY, |hit| hit.t)) {
+                let around = face.boxes.get(at).map(|[low, high]| [*low - wider, *high + wider]);
+                let last = nearest.map_or(f64::INFINITY, |hit| hit.t);
+                if around.is_some_and(|around| !enters(around, origin, inverse, last)) {
                     continue;
                 }
                 if depth > 0 {
@@ -157,7 +168,7 @@ impl<'a> Truth<'a> {
 
     /// Whether the surface is in the way from a point of it, `clear` of itself.
     pub fn blocked(&self, from: DVec3, direction: DVec3, clear: f64) -> bool {
-        self.first(from + direction.normalize() * clear, direction, true).is_some()
+        self.first(from + direction.normalize() * clear, direction, true, 0).is_some()
     }
 
     fn leaf(
@@ -217,6 +228,11 @@ impl<'a> Truth<'a> {
     /// What a camera sees in a direction that is 1 along its view axis.
     pub fn seen(&self, camera: &Camera, direction: DVec3) -> Option<Hit> {
         self.first_hit(camera.eye + direction * camera.near(), direction)
+    }
+
+    /// The same with micro-triangles a thirty-second of a texel wide.
+    pub fn seen_finely(&self, camera: &Camera, direction: DVec3) -> Option<Hit> {
+        self.first(camera.eye + direction * camera.near(), direction, false, 3)
     }
 
     /// The whole picture, row by row from the top.
