@@ -51,13 +51,17 @@ fn prism_point(prism: Prism, t: f32, guess: PrismPoint, across: vec3f) -> PrismP
     return found;
 }
 
+// The least of the three weights of a point: negative beside the triangle.
+fn least_weight(point: PrismPoint) -> f32 {
+    return min(1.0 - point.weights.x - point.weights.y, min(point.weights.x, point.weights.y));
+}
+
 // Whether a point found so is over the triangle of the prism, and on the ray. Between the places where a ray goes in and
 // out of a prism that is folded over itself it may be outside, and the method may end anywhere.
 fn is_of_prism(prism: Prism, point: PrismPoint) -> bool {
-    let w = vec3f(1.0 - point.weights.x - point.weights.y, point.weights);
     let size = length(prism.p1 - prism.p0) + length(prism.p2 - prism.p0);
     let near = length(prism_place(prism, point) - vec3f(0.0, 0.0, point.t)) <= OFF * size + ROUNDED * abs(point.t);
-    return near && min(w.x, min(w.y, w.z)) >= -OUTSIDE;
+    return near && least_weight(point) >= -OUTSIDE;
 }
 
 fn mix_points(a: PrismPoint, b: PrismPoint, share: f32) -> PrismPoint {

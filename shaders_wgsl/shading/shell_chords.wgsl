@@ -51,20 +51,20 @@ fn search_prism(ray: ShellRay, crossing: Crossing, best: ShellHit) -> ShellHit {
     var halfway = prism_point(prism, between.t, between, vec3f(0.0));
     var across = vec3f(0.0);
     var turns_back = false;
+    var turned = false;
     if (prism_volume(prism, span.enter) < 0.0) != (prism_volume(prism, span.leave) < 0.0) {
         let way = vec3f(span.leave.weights - span.enter.weights, span.leave.rise - span.enter.rise);
         let along = way / vec3f(1.0, 1.0, height_info.scale * height_info.scale);
         let around = prism_point(prism, between.t, between, along);
-        let w = vec3f(1.0 - around.weights.x - around.weights.y, around.weights);
-        turns_back = is_of_prism(prism, around) && min(w.x, min(w.y, w.z)) >= 0.0;
+        turns_back = is_of_prism(prism, around) && least_weight(around) >= 0.0;
         if turns_back {
             across = along;
             halfway = around;
+            // Turning back in t and turning inside out, the front stays the front.
+            let slopes = prism_slopes(prism, around);
+            turned = dot(cross(slopes[0], slopes[1]), across) < 0.0;
         }
     }
-    let slopes = prism_slopes(prism, halfway);
-    // Turning back in t and turning inside out, the front stays the front.
-    let turned = dot(cross(slopes[0], slopes[1]), across) < 0.0;
     let off = in_texture(halfway, uvs, prism) - 0.5 * (enter + leave);
     let sag = max(length(off.xy * size) / SAG.x, abs(off.z) / SAG.y);
     let chords = clamp(ceil(sqrt(min(sag, 1e6))), 1.0, MAX_CHORDS);
