@@ -130,46 +130,69 @@ pub fn from(eye: [f64; 3]) -> Camera {
     Camera::look_at(DVec3::from(eye), DVec3::ZERO)
 }
 
+/// A pixel of a picture, and rays through it.
+struct Pixel {
+    /// Whether the picture shows anything there, and where that is.
+    shown: Option<DVec3>,
+    /// How wide the pixel is there.
+    width: f64,
+    middle: DVec3,
+    right: DVec3,
+    down: DVec3,
+}
+
+impl Pixel {
+    /// The frame needs the outputs mask and position.
+    fn new(at: usize, frame: &Frame, camera: &Camera) -> Self {
+        let (mask, positions) = (frame.aovs.mask.as_ref().unwrap(), frame.aovs.position.as_ref().unwrap());
+        let [corner, right, down] = camera.pixel_directions([frame.width, frame.height], 0);
+        let place = Vec3::from_slice(&positions[3 * at..]).as_dvec3();
+        let (x, y) = (at % frame.width as usize, at / frame.width as usize);
+        Self {
+            shown: (mask[at] == 1).then_some(place),
+            width: right.length() * (place - camera.eye).dot(camera.forward()),
+            middle: corner + right * (x as f64 + 0.5) + down * (y as f64 + 0.5),
+            right,
+            down,
+        }
+    }
+
+    /// The direction of the ray so far from the middle, in pixels.
+    fn ray(&self, dx: f64, dy: f64) -> DVec3 {
+        self.middle + self.right * dx + self.down * dy
+    }
+}
+
 /// Of some pixels those that show what is nowhere within a pixel, or nothing: some things are seen from one point of a
 /// pixel only, being thinner.
 pub fn lost(pixels: &[usize], frame: &Frame, judge: &Truth<'_>, camera: &Camera) -> usize {
     const RAYS: i32 = 24;
-    let size = [frame.width, frame.height];
-    let [corner, right, down] = camera.pixel_directions(size, 0);
-    let (mask, positions) = (frame.aovs.mask.as_ref().unwrap(), frame.aovs.position.as_ref().unwrap());
-    let shown = |&&at: &&usize| {
-        let place = Vec3::from_slice(&positions[3 * at..]).as_dvec3();
-        let reach = 1.5 * right.length() * (place - camera.eye).dot(camera.forward());
-        let (x, y) = ((at % size[0] as usize) as f64 + 0.5, (at / size[0] as usize) as f64 + 0.5);
-        mask[at] == 1
-            && (-RAYS..=RAYS).flat_map(|i| (-RAYS..=RAYS).map(move |j| (i, j))).any(|(i, j)| {
-                let [dx, dy] = [i, j].map(|k| f64::from(k) / f64::from(RAYS));
-                let hit = judge.seen(camera, corner + right * (x + dx) + down * (y + dy));
-                hit.is_some_and(|hit| hit.position.distance(place) < reach)
-            })
+    let is_lost = |at: usize| {
+        let pixel = Pixel::new(at, frame, camera);
+        let Some(place) = pixel.shown else { return true };
+        !(-RAYS..=RAYS).flat_map(|i| (-RAYS..=RAYS).map(move |j| (i, j))).any(|(i, j)| {
+            let [dx, dy] = [i, j].map(|k| f64::from(k) / f64::from(RAYS));
+            let hit = judge.seen(camera, pixel.ray(dx, dy));
+            hit.is_some_and(|hit| hit.position.distance(place) < 1.5 * pixel.width)
+        })
     };
-    pixels.iter().filter(|at| !shown(at)).count()
+    pixels.iter().filter(|&&at| is_lost(at)).count()
 }
 
 /// How many of some pixels do not show what a ray within a fiftieth of a pixel meets, or nothing where such a ray meets
 /// nothing: outlines and crests may pass between two rays that are hardly apart. The truth looks finely here.
 pub fn disproved(pixels: &[usize], frame: &Frame, judge: &Truth<'_>, camera: &Camera) -> usize {
     const WITHIN: f64 = 0.02;
-    let size = [frame.width, frame.height];
-    let [corner, right, down] = camera.pixel_directions(size, 0);
-    let (mask, positions) = (frame.aovs.mask.as_ref().unwrap(), frame.aovs.position.as_ref().unwrap());
     let is_so = |at: usize| {
-        let place = Vec3::from_slice(&positions[3 * at..]).as_dvec3();
-        let pixel = right.length() * (place - camera.eye).dot(camera.forward());
-        let (x, y) = ((at % size[0] as usize) as f64 + 0.5, (at / size[0] as usize) as f64 + 0.5);
+        let pixel = Pixel::new(at, frame, camera);
         let spots =
             (0..=4).flat_map(|ring| (0..24).map(move |turn| (f64::from(ring) / 4.0, f64::from(turn))));
         spots.into_iter().any(|(ring, turn)| {
             let (sine, cosine) = (turn * std::f64::consts::TAU / 24.0).sin_cos();
-            let (dx, dy) = (WITHIN * ring * cosine, WITHIN * ring * sine);
-            match judge.seen_finely(camera, corner + right * (x + dx) + down * (y + dy)) {
-                Some(hit) => mask[at] == 1 && hit.position.distance(place) < pixel,
-                None => mask[at] == 0,
+            let ray = pixel.ray(WITHIN * ring * cosine, WITHIN * ring * sine);
+            match (judge.seen_finely(camera, ray), pixel.shown) {
+                (Some(hit), Some(place)) => hit.position.distance(place) < pixel.width,
+                (hit, shown) => hit.is_none() && shown.is_none(),
             }
         })
     };
