@@ -13,8 +13,8 @@ use crate::{HeightField, RayArray, Status};
 pub struct Chunk<'a> {
     pub(crate) origins: RayArray<'a>,
     pub(crate) directions: RayArray<'a>,
-    /// Numbers of the rays in the order in which the exact search follows them; none at all when that is the
-    /// order they have.
+    /// Where the runs of [`RUN`](crate::order::RUN) rays begin, in the order in which the exact search follows
+    /// them; none at all when rays are followed in the order they have.
     pub(crate) order: &'a [u32],
     pub(crate) from_surface: bool,
     pub(crate) cancel: Option<&'a AtomicBool>,

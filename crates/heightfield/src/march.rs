@@ -83,18 +83,10 @@ pub(crate) fn march_exact(field: &HeightField, chunk: &mut Chunk<'_>) {
 }
 
 impl Chunk<'_> {
-    /// Runs the exact search in `f64` on the chosen rays, one after the other.
+    /// Runs the exact search in `f64` on some rays, one after the other.
     #[inline(always)]
-    pub(crate) fn march_singly(
-        &mut self,
-        field: &HeightField,
-        range: std::ops::Range<usize>,
-        chosen: impl Fn(usize) -> bool,
-    ) {
-        for i in range {
-            if !chosen(i) {
-                continue;
-            }
+    pub(crate) fn march_singly(&mut self, field: &HeightField, rays: impl IntoIterator<Item = usize>) {
+        for i in rays {
             if self.cancelled() {
                 return;
             }
@@ -179,8 +171,8 @@ pub fn march_into(
     let exact = technique.info.reads == Reads::Pyramid;
     // Rays that start on the surface are followed one by one.
     let side_by_side = exact && !options.from_surface;
-    let order = if side_by_side { order::squares(field, origins, directions) } else { Vec::new() };
-    let size = if order.is_empty() { CHUNK } else { order.len() };
+    let squares = if side_by_side { order::squares(field, origins, directions) } else { None };
+    let (size, order) = squares.map_or((CHUNK, Vec::new()), |squares| (squares.rays, squares.runs));
     let chunks: Vec<Chunk<'_>> = (0..n)
         .step_by(size)
         .map(|from| {
@@ -189,7 +181,7 @@ pub fn march_into(
             Chunk {
                 origins: origins.slice(from, to),
                 directions: directions.slice(from, to),
-                order: if to - from == order.len() { &order } else { &[] },
+                order: if to - from == size { &order } else { &[] },
                 from_surface: options.from_surface,
                 cancel: options.cancel,
                 t,

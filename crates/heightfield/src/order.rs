@@ -6,8 +6,8 @@
 
 use crate::{HeightField, RayArray};
 
-/// Side of a square, in rays.
-const SIDE: usize = 8;
+/// Rays that follow one another in the order as they do in their arrays; the side of a square.
+pub(crate) const RUN: usize = 8;
 /// The narrowest picture that is worth it.
 const NARROWEST: usize = 64;
 /// The widest whose rows are looked for.
@@ -21,27 +21,28 @@ const ROWS_APART: f64 = 3.0;
 /// Rays closer together than this, in cells, are as good as in one place.
 const CLOSE: f64 = 0.25;
 
-/// The numbers of the rays of eight rows of a picture, in squares; none at all for rays that do not lie in
-/// rows. The rows after them have the same order.
-pub(crate) fn squares(field: &HeightField, origins: RayArray<'_>, directions: RayArray<'_>) -> Vec<u32> {
-    Paths { field, origins, directions }.width().map(numbers).unwrap_or_default()
+/// Eight rows of a picture, cut into squares. The rows after them are cut alike.
+pub(crate) struct Squares {
+    /// Where the rows of each square begin, square by square.
+    pub runs: Vec<u32>,
+    /// How many rays the eight rows have.
+    pub rays: usize,
 }
 
-/// The numbers of rays in rows so wide, square by square, each along a Morton curve (Morton 1966). Columns
-/// that fill no square come last.
-fn numbers(width: usize) -> Vec<u32> {
-    let every_other = |bits: usize| (0..3).fold(0, |x, k| x | (bits >> (2 * k) & 1) << k);
-    let whole = width / SIDE * SIDE;
-    let mut numbers = Vec::with_capacity(SIDE * width);
-    for left in (0..whole).step_by(SIDE) {
-        for place in 0..SIDE * SIDE {
-            numbers.push((every_other(place >> 1) * width + left + every_other(place)) as u32);
-        }
-    }
-    for row in 0..SIDE {
-        numbers.extend((whole..width).map(|column| (row * width + column) as u32));
-    }
-    numbers
+/// How rays are cut into squares; `None` for rays that do not lie in rows.
+pub(crate) fn squares(
+    field: &HeightField,
+    origins: RayArray<'_>,
+    directions: RayArray<'_>,
+) -> Option<Squares> {
+    let width = Paths { field, origins, directions }.width()?;
+    Some(Squares { runs: runs(width), rays: RUN * width })
+}
+
+/// Squares from left to right. The last overlaps the one before unless all are whole.
+fn runs(width: usize) -> Vec<u32> {
+    let lefts = (0..width).step_by(RUN).map(|left| left.min(width - RUN));
+    lefts.flat_map(|left| (0..RUN).map(move |row| (row * width + left) as u32)).collect()
 }
 
 /// Rays on the map.
@@ -84,7 +85,7 @@ impl Paths<'_> {
     /// How many rays are in a row, if these are the rows of a picture and lie close enough to each other.
     fn width(&self) -> Option<usize> {
         let n = self.origins.len();
-        let widest = WIDEST.min(n / SIDE);
+        let widest = WIDEST.min(n / RUN);
         if widest < NARROWEST {
             return None;
         }
@@ -92,7 +93,7 @@ impl Paths<'_> {
         let ends_row = |i: usize| self.distance(i - 1, i) > JUMP * step;
         let width = (1..=widest).find(|&i| ends_row(i)).filter(|&width| width >= NARROWEST)?;
         let rows = n / width;
-        let regular = (1..SIDE).all(|k| ends_row((1 + k * (rows - 2) / SIDE) * width));
+        let regular = (1..RUN).all(|k| ends_row((1 + k * (rows - 2) / RUN) * width));
         (regular && self.middle_distance(width) <= ROWS_APART * step).then_some(width)
     }
 }
@@ -108,7 +109,7 @@ mod tests {
         ((0..width * height).flat_map(at).collect(), [0.3, 0.1, -1.0].repeat(width * height))
     }
 
-    fn order((origins, directions): &(Vec<f32>, Vec<f32>)) -> Vec<u32> {
+    fn cut((origins, directions): &(Vec<f32>, Vec<f32>)) -> Option<Squares> {
         let field = HeightField::new(&[0.5; 64 * 64], 64, 64, Wrap::Repeat).unwrap();
         squares(&field, RayArray::F32(origins), RayArray::F32(directions))
     }
@@ -116,17 +117,20 @@ mod tests {
     #[test]
     fn rows_of_a_picture_are_cut_into_squares() {
         for (width, height) in [(64, 64), (100, 9), (1023, 40), (640, 481)] {
-            let order = order(&picture(width, height, [1.0, 1.0]));
-            assert_eq!(order.len(), SIDE * width, "{width} x {height}");
-            let mut sorted = order.clone();
-            sorted.sort_unstable();
-            assert!(sorted.iter().enumerate().all(|(at, &number)| number as usize == at));
-            for square in order[..width / SIDE * SIDE * SIDE].chunks(16) {
-                let columns = square.iter().map(|&number| number as usize % width);
-                let rows = square.iter().map(|&number| number as usize / width);
-                assert_eq!(columns.clone().max().unwrap() - columns.min().unwrap(), 3);
-                assert_eq!(rows.clone().max().unwrap() - rows.min().unwrap(), 3);
+            let squares = cut(&picture(width, height, [1.0, 1.0])).unwrap();
+            assert_eq!(squares.rays, RUN * width, "{width} x {height}");
+            let mut seen = vec![0; RUN * width];
+            for square in squares.runs.chunks(RUN) {
+                for (row, &start) in square.iter().enumerate() {
+                    assert_eq!(start as usize, row * width + square[0] as usize);
+                    assert!(square[0] as usize + RUN <= width);
+                    seen[start as usize..][..RUN].iter_mut().for_each(|count| *count += 1);
+                }
             }
+            // Once, but for columns in which two squares overlap.
+            assert!(seen.iter().all(|&count| count >= 1), "{width} x {height}");
+            let twice = seen.iter().filter(|&&count| count == 2).count();
+            assert_eq!(twice, RUN * (width.next_multiple_of(RUN) - width), "{width} x {height}");
         }
     }
 
@@ -138,22 +142,21 @@ mod tests {
             [x, 0.4 + y, -1.0]
         });
         let rays = ([0.5, 0.5, 2.0].repeat(width * height), directions.collect());
-        assert_eq!(order(&rays).len(), SIDE * width);
+        assert_eq!(cut(&rays).unwrap().rays, RUN * width);
     }
 
     #[test]
     fn other_rays_stay_as_they_are() {
-        let none: Vec<u32> = Vec::new();
         // One row, rows far apart, too few rows, too narrow.
         for (width, height, apart) in [(65_536, 1, 1.0), (100, 100, 9.0), (300, 7, 1.0), (24, 600, 1.0)] {
-            assert_eq!(order(&picture(width, height, [1.0, apart])), none);
+            assert!(cut(&picture(width, height, [1.0, apart])).is_none());
         }
         let (mut origins, directions) = picture(256, 256, [1.0, 1.0]);
         for i in 0..256 * 256 {
             origins.swap(3 * i, 3 * (i * 7919 % 65_536));
         }
-        assert_eq!(order(&(origins.clone(), directions.clone())), none);
+        assert!(cut(&(origins.clone(), directions.clone())).is_none());
         origins.fill(f32::NAN);
-        assert_eq!(order(&(origins, directions)), none);
+        assert!(cut(&(origins, directions)).is_none());
     }
 }

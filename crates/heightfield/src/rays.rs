@@ -4,7 +4,8 @@ use num_traits::Float;
 use rayon::prelude::*;
 
 use crate::HeightFieldError;
-use crate::lanes::Lanes;
+use crate::lanes::{Kernel, Lanes, dispatch};
+use crate::order::RUN;
 
 /// Rays looked at by one task at a time.
 const CHUNK: usize = 1 << 14;
@@ -75,15 +76,16 @@ pub(crate) fn load<L: Lanes>(rays: RayArray<'_>, at: usize) -> [L::D; 3] {
     }
 }
 
-/// The rays of these numbers, one component a vector; the last of them stands in for those behind it.
+/// The rays from the first of two places on, and from the other what [`RUN`] rays leave of the vector.
 #[inline(always)]
-pub(crate) fn load_numbered<L: Lanes>(rays: RayArray<'_>, numbers: &[u32]) -> [L::D; 3] {
-    let last = numbers.len() - 1;
+pub(crate) fn load_runs<L: Lanes>(rays: RayArray<'_>, starts: [usize; 2]) -> [L::D; 3] {
+    if L::WIDTH <= RUN {
+        return load::<L>(rays, starts[0]);
+    }
+    let ray = |lane: usize| starts[lane / RUN] + lane % RUN;
     match rays {
-        RayArray::F32(rays) => split::<L>(&collect(rays, L::WIDTH, |lane| numbers[lane.min(last)] as usize)),
-        RayArray::F64(rays) => {
-            split_wide::<L>(&collect(rays, L::WIDTH, |lane| numbers[lane.min(last)] as usize))
-        }
+        RayArray::F32(rays) => split::<L>(&collect(rays, L::WIDTH, ray)),
+        RayArray::F64(rays) => split_wide::<L>(&collect(rays, L::WIDTH, ray)),
     }
 }
 
@@ -141,13 +143,7 @@ pub(crate) fn same_count(origins: RayArray<'_>, directions: RayArray<'_>) -> Res
 
 /// The first ray that is not finite or has no direction.
 pub(crate) fn first_unsound(origins: RayArray<'_>, directions: RayArray<'_>) -> Option<usize> {
-    let sound = match origins {
-        RayArray::F32(a) => all_finite(a),
-        RayArray::F64(a) => all_finite(a),
-    } && match directions {
-        RayArray::F32(a) => all_directed(a),
-        RayArray::F64(a) => all_directed(a),
-    };
+    let sound = dispatch(Sound { origins, directions });
     if sound {
         return None;
     }
@@ -172,11 +168,36 @@ fn finite(ray: [f64; 3]) -> bool {
     ray.iter().all(|x| x.is_finite())
 }
 
+/// Whether all rays are finite and have a direction.
+struct Sound<'a> {
+    origins: RayArray<'a>,
+    directions: RayArray<'a>,
+}
+
+impl Kernel for Sound<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> bool {
+        let finite = match self.origins {
+            RayArray::F32(a) => all_finite(a),
+            RayArray::F64(a) => all_finite(a),
+        };
+        let directed = match self.directions {
+            RayArray::F32(a) => all_directed(a),
+            RayArray::F64(a) => all_directed(a),
+        };
+        finite && directed
+    }
+}
+
 /// Without an early way out, so that it compiles to vector instructions: rays are sound as a rule.
+#[inline(always)]
 fn all_finite<T: Float>(values: &[T]) -> bool {
     values.iter().fold(true, |sound, x| sound & x.is_finite())
 }
 
+#[inline(always)]
 fn all_directed<T: Float>(directions: &[T]) -> bool {
     let zero = T::zero();
     directions.chunks_exact(3).fold(true, |sound, d| {

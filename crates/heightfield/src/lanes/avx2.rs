@@ -3,7 +3,7 @@
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
-use super::{Lanes, SWAP_ONES, SWAP_PAIRS};
+use super::Lanes;
 
 /// 8 lanes with AVX2.
 #[derive(Debug, Clone, Copy)]
@@ -74,6 +74,30 @@ impl M {
     }
 }
 
+/// Places in a table; single loads take less than the instructions that gather.
+#[inline(always)]
+fn places(at: I) -> [usize; 8] {
+    let mut places = [0; 8];
+    Avx2::store_int(at, &mut places);
+    places.map(|place| place as u32 as usize)
+}
+
+/// From four vectors of two rows of four, lanes `k` and `k + 4` in vector `k`, to the columns.
+#[inline(always)]
+unsafe fn transpose(rows: [__m256; 4]) -> [F; 4] {
+    unsafe {
+        let [a, b, c, d] = rows;
+        let (low, high) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+        let (lower, higher) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
+        [
+            F(_mm256_shuffle_ps::<0b01_00_01_00>(low, lower)),
+            F(_mm256_shuffle_ps::<0b11_10_11_10>(low, lower)),
+            F(_mm256_shuffle_ps::<0b01_00_01_00>(high, higher)),
+            F(_mm256_shuffle_ps::<0b11_10_11_10>(high, higher)),
+        ]
+    }
+}
+
 /// For each mask of 8 bits, the chosen lanes in order.
 static CHOSEN: [[i32; 8]; 256] = {
     let mut table = [[0; 8]; 256];
@@ -86,6 +110,22 @@ static CHOSEN: [[i32; 8]; 256] = {
                 count += 1;
             }
             lane += 1;
+        }
+        mask += 1;
+    }
+    table
+};
+
+/// For each mask of 4 bits, the chosen pairs of lanes in order.
+static CHOSEN_PAIRS: [[i32; 8]; 16] = {
+    let mut table = [[0; 8]; 16];
+    let mut mask = 0;
+    while mask < 16 {
+        let mut pair = 0;
+        while pair < 4 {
+            table[mask][2 * pair] = 2 * CHOSEN[mask][pair];
+            table[mask][2 * pair + 1] = 2 * CHOSEN[mask][pair] + 1;
+            pair += 1;
         }
         mask += 1;
     }
@@ -125,14 +165,19 @@ impl Lanes for Avx2 {
     }
     #[inline(always)]
     fn load_triples(from: &[f32]) -> [F; 3] {
-        let from = &from[..24];
-        let mut parts = [[0.0; 8]; 3];
-        for lane in 0..8 {
-            for (k, part) in parts.iter_mut().enumerate() {
-                part[lane] = from[3 * lane + k];
-            }
+        let from = from[..24].as_ptr();
+        unsafe {
+            // Three numbers of one ray and the first of the next are four steps of a shuffle apart.
+            let halves = |k: usize| _mm256_loadu2_m128(from.add(12 + 4 * k), from.add(4 * k));
+            let (a, b, c) = (halves(0), halves(1), halves(2));
+            let late = _mm256_shuffle_ps::<0b10_01_11_10>(b, c);
+            let early = _mm256_shuffle_ps::<0b01_00_10_01>(a, b);
+            [
+                F(_mm256_shuffle_ps::<0b10_00_11_00>(a, late)),
+                F(_mm256_shuffle_ps::<0b11_01_10_00>(early, late)),
+                F(_mm256_shuffle_ps::<0b11_00_11_01>(early, c)),
+            ]
         }
-        [Self::load(&parts[0]), Self::load(&parts[1]), Self::load(&parts[2])]
     }
     #[inline(always)]
     fn store(x: F, to: &mut [f32]) {
@@ -164,20 +209,6 @@ impl Lanes for Avx2 {
     #[inline(always)]
     fn max(a: F, b: F) -> F {
         F(unsafe { _mm256_max_ps(a.0, b.0) })
-    }
-    #[inline(always)]
-    fn least_of_four(x: F) -> F {
-        unsafe {
-            let x = Self::min(x, F(_mm256_permute_ps::<SWAP_ONES>(x.0)));
-            Self::min(x, F(_mm256_permute_ps::<SWAP_PAIRS>(x.0)))
-        }
-    }
-    #[inline(always)]
-    fn largest_of_four(x: F) -> F {
-        unsafe {
-            let x = Self::max(x, F(_mm256_permute_ps::<SWAP_ONES>(x.0)));
-            Self::max(x, F(_mm256_permute_ps::<SWAP_PAIRS>(x.0)))
-        }
     }
     #[inline(always)]
     fn abs(x: F) -> F {
@@ -288,21 +319,39 @@ impl Lanes for Avx2 {
         })
     }
     #[inline(always)]
+    unsafe fn gather_all(table: &[f32], at: I) -> F {
+        let [a, b, c, d, e, f, g, h] = places(at);
+        // SAFETY: the caller keeps all lanes inside the table.
+        F(unsafe {
+            let one = |place: usize| *table.get_unchecked(place);
+            _mm256_setr_ps(one(a), one(b), one(c), one(d), one(e), one(f), one(g), one(h))
+        })
+    }
+    #[inline(always)]
     unsafe fn gather_pairs(table: &[f32], at: I) -> (F, F) {
-        // A pair is one 64-bit number; half as many reads as two gathers.
+        // A pair is one 64-bit number, and single loads take less than the instruction that gathers.
+        let places = places(at);
         // SAFETY: the caller keeps all lanes and the numbers behind them inside the table.
         unsafe {
-            let base = table.as_ptr().cast();
-            let low = _mm256_i32gather_pd::<4>(base, _mm256_castsi256_si128(at.0));
-            let high = _mm256_i32gather_pd::<4>(base, _mm256_extracti128_si256::<1>(at.0));
-            let (low, high) = (_mm256_castpd_ps(low), _mm256_castpd_ps(high));
-            let order = |x: __m256| {
-                let x = _mm256_permute4x64_epi64::<0b11_01_10_00>(_mm256_castps_si256(x));
-                F(_mm256_castsi256_ps(x))
-            };
-            let even = _mm256_shuffle_ps::<0b10_00_10_00>(low, high);
-            let odd = _mm256_shuffle_ps::<0b11_01_11_01>(low, high);
-            (order(even), order(odd))
+            let pair = |lane: usize| table.as_ptr().add(places[lane]).cast::<f64>();
+            let two = |a: usize, b: usize| _mm_castpd_ps(_mm_loadh_pd(_mm_load_sd(pair(a)), pair(b)));
+            let (first, second) =
+                (_mm256_set_m128(two(4, 5), two(0, 1)), _mm256_set_m128(two(6, 7), two(2, 3)));
+            let even = _mm256_shuffle_ps::<0b10_00_10_00>(first, second);
+            let odd = _mm256_shuffle_ps::<0b11_01_11_01>(first, second);
+            (F(even), F(odd))
+        }
+    }
+    #[inline(always)]
+    unsafe fn gather_squares(table: &[f32], at: I, below: usize) -> [F; 4] {
+        let places = places(at);
+        // SAFETY: the caller keeps all lanes and their squares inside the table.
+        unsafe {
+            let pair = |lane: usize, from: usize| table.as_ptr().add(from).add(places[lane]).cast::<f64>();
+            let square =
+                |lane: usize| _mm_castpd_ps(_mm_loadh_pd(_mm_load_sd(pair(lane, 0)), pair(lane, below)));
+            let squares = |lane: usize| _mm256_set_m128(square(lane + 4), square(lane));
+            transpose([squares(0), squares(1), squares(2), squares(3)])
         }
     }
 
@@ -352,11 +401,17 @@ impl Lanes for Avx2 {
     }
     #[inline(always)]
     fn compress_wide(chosen: M, x: D, to: &mut [f64]) -> usize {
-        let mut from = [0.0; 8];
-        Self::store_wide(x, &mut from);
-        let (to, bits) = (&mut to[..8], Self::bits(chosen));
-        for (to, &lane) in to.iter_mut().zip(&CHOSEN[bits as usize]) {
-            *to = from[lane as usize];
+        let to = &mut to[..8];
+        let bits = Self::bits(chosen) as usize;
+        // Each half by itself, as pairs of 32 bits.
+        let half = |x: __m256d, bits: usize| unsafe {
+            let order = Self::load_int(&CHOSEN_PAIRS[bits & 15]);
+            _mm256_castsi256_pd(_mm256_permutevar8x32_epi32(_mm256_castpd_si256(x), order.0))
+        };
+        let low = (bits & 15).count_ones() as usize;
+        unsafe {
+            _mm256_storeu_pd(to.as_mut_ptr(), half(x.0, bits));
+            _mm256_storeu_pd(to[low..low + 4].as_mut_ptr(), half(x.1, bits >> 4));
         }
         bits.count_ones() as usize
     }
@@ -390,5 +445,9 @@ impl Lanes for Avx2 {
             let (low, high) = mask.widen();
             D(_mm256_blendv_pd(no.0, yes.0, low), _mm256_blendv_pd(no.1, yes.1, high))
         }
+    }
+    #[inline(always)]
+    fn select_signed_wide(sign: D, yes: D, no: D) -> D {
+        unsafe { D(_mm256_blendv_pd(no.0, yes.0, sign.0), _mm256_blendv_pd(no.1, yes.1, sign.1)) }
     }
 }

@@ -3,7 +3,7 @@
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
-use super::{Lanes, SWAP_ONES, SWAP_PAIRS};
+use super::Lanes;
 
 /// 16 lanes with AVX-512.
 #[derive(Debug, Clone, Copy)]
@@ -144,20 +144,6 @@ impl Lanes for Avx512 {
         F(unsafe { _mm512_max_ps(a.0, b.0) })
     }
     #[inline(always)]
-    fn least_of_four(x: F) -> F {
-        unsafe {
-            let x = Self::min(x, F(_mm512_permute_ps::<SWAP_ONES>(x.0)));
-            Self::min(x, F(_mm512_permute_ps::<SWAP_PAIRS>(x.0)))
-        }
-    }
-    #[inline(always)]
-    fn largest_of_four(x: F) -> F {
-        unsafe {
-            let x = Self::max(x, F(_mm512_permute_ps::<SWAP_ONES>(x.0)));
-            Self::max(x, F(_mm512_permute_ps::<SWAP_PAIRS>(x.0)))
-        }
-    }
-    #[inline(always)]
     fn abs(x: F) -> F {
         F(unsafe { _mm512_abs_ps(x.0) })
     }
@@ -255,6 +241,11 @@ impl Lanes for Avx512 {
         })
     }
     #[inline(always)]
+    unsafe fn gather_all(table: &[f32], at: I) -> F {
+        // SAFETY: the caller keeps all lanes inside the table.
+        unsafe { Self::gather(table, at, Self::first(Self::WIDTH)) }
+    }
+    #[inline(always)]
     unsafe fn gather_pairs(table: &[f32], at: I) -> (F, F) {
         // A pair is one 64-bit number; half as many reads as two gathers.
         // SAFETY: the caller keeps all lanes and the numbers behind them inside the table.
@@ -266,6 +257,15 @@ impl Lanes for Avx512 {
             let even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
             let odd = _mm512_setr_epi32(1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
             (F(_mm512_permutex2var_ps(low, even, high)), F(_mm512_permutex2var_ps(low, odd, high)))
+        }
+    }
+    #[inline(always)]
+    unsafe fn gather_squares(table: &[f32], at: I, below: usize) -> [F; 4] {
+        // SAFETY: the caller keeps all lanes and their squares inside the table.
+        unsafe {
+            let upper = Self::gather_pairs(table, at);
+            let lower = Self::gather_pairs(&table[below..], at);
+            [upper.0, upper.1, lower.0, lower.1]
         }
     }
 
@@ -362,6 +362,15 @@ impl Lanes for Avx512 {
             D(
                 _mm512_mask_blend_pd(mask.0 as u8, no.0, yes.0),
                 _mm512_mask_blend_pd((mask.0 >> 8) as u8, no.1, yes.1),
+            )
+        }
+    }
+    #[inline(always)]
+    fn select_signed_wide(sign: D, yes: D, no: D) -> D {
+        unsafe {
+            D(
+                _mm512_mask_blend_pd(_mm512_movepi64_mask(_mm512_castpd_si512(sign.0)), no.0, yes.0),
+                _mm512_mask_blend_pd(_mm512_movepi64_mask(_mm512_castpd_si512(sign.1)), no.1, yes.1),
             )
         }
     }

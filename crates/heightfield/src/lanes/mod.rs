@@ -45,12 +45,6 @@ macro_rules! wide_operators {
     )* };
 }
 
-/// Orders of four numbers in which each pair, and both pairs, are swapped.
-#[cfg(target_arch = "x86_64")]
-const SWAP_ONES: i32 = 0b10_11_00_01;
-#[cfg(target_arch = "x86_64")]
-const SWAP_PAIRS: i32 = 0b01_00_11_10;
-
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 #[cfg(target_arch = "x86_64")]
@@ -99,10 +93,6 @@ pub trait Lanes: Copy + Send + Sync + 'static {
     fn min(a: Self::F, b: Self::F) -> Self::F;
     /// The larger.
     fn max(a: Self::F, b: Self::F) -> Self::F;
-    /// In each lane the least of its group of four. With fewer lanes than four, of all.
-    fn least_of_four(x: Self::F) -> Self::F;
-    /// In each lane the largest of its group of four. With fewer lanes than four, of all.
-    fn largest_of_four(x: Self::F) -> Self::F;
     /// Without its sign.
     fn abs(x: Self::F) -> Self::F;
     /// The next whole number below.
@@ -152,11 +142,21 @@ pub trait Lanes: Copy + Send + Sync + 'static {
     /// # Safety
     /// Chosen lanes of `at` are in `0..table.len()`.
     unsafe fn gather(table: &[f32], at: Self::I, chosen: Self::M) -> Self::F;
+    /// `table[at]`.
+    ///
+    /// # Safety
+    /// All lanes of `at` are in `0..table.len()`.
+    unsafe fn gather_all(table: &[f32], at: Self::I) -> Self::F;
     /// `(table[at], table[at + 1])`.
     ///
     /// # Safety
     /// All lanes of `at` are in `0..table.len() - 1`.
     unsafe fn gather_pairs(table: &[f32], at: Self::I) -> (Self::F, Self::F);
+    /// `table[at]`, `table[at + 1]`, and the two numbers `below` further on: a square of a table by rows.
+    ///
+    /// # Safety
+    /// All lanes of `at` are in `0..table.len() - below - 1`.
+    unsafe fn gather_squares(table: &[f32], at: Self::I, below: usize) -> [Self::F; 4];
 
     /// The mask of the first `n` lanes.
     fn first(n: usize) -> Self::M;
@@ -196,6 +196,8 @@ pub trait Lanes: Copy + Send + Sync + 'static {
     fn le_wide(a: Self::D, b: Self::D) -> Self::M;
     /// `yes` where the mask is set, `no` elsewhere.
     fn select_wide(mask: Self::M, yes: Self::D, no: Self::D) -> Self::D;
+    /// `yes` where the sign bit of a number is set, `no` elsewhere.
+    fn select_signed_wide(sign: Self::D, yes: Self::D, no: Self::D) -> Self::D;
 }
 
 /// Something to run with the lanes of the processor.

@@ -128,14 +128,6 @@ impl<const N: usize> Lanes for Portable<N> {
         zip(a, b, |a, b| if a > b { a } else { b })
     }
     #[inline(always)]
-    fn least_of_four(x: Self::F) -> Self::F {
-        Array(from_fn(|i| x.0[i & !3..N.min((i & !3) + 4)].iter().copied().fold(f32::INFINITY, f32::min)))
-    }
-    #[inline(always)]
-    fn largest_of_four(x: Self::F) -> Self::F {
-        Array(from_fn(|i| x.0[i & !3..N.min((i & !3) + 4)].iter().copied().fold(f32::NEG_INFINITY, f32::max)))
-    }
-    #[inline(always)]
     fn abs(x: Self::F) -> Self::F {
         map(x, f32::abs)
     }
@@ -229,10 +221,23 @@ impl<const N: usize> Lanes for Portable<N> {
         Array(from_fn(|i| if chosen.0[i] { unsafe { *table.get_unchecked(at.0[i] as usize) } } else { 0.0 }))
     }
     #[inline(always)]
+    unsafe fn gather_all(table: &[f32], at: Self::I) -> Self::F {
+        // SAFETY: the caller keeps all lanes inside the table.
+        map(at, |k| unsafe { *table.get_unchecked(k as usize) })
+    }
+    #[inline(always)]
     unsafe fn gather_pairs(table: &[f32], at: Self::I) -> (Self::F, Self::F) {
         // SAFETY: the caller keeps all lanes and the numbers behind them inside the table.
         let read = |k: usize| Array(from_fn(|i| unsafe { *table.get_unchecked(at.0[i] as usize + k) }));
         (read(0), read(1))
+    }
+    #[inline(always)]
+    unsafe fn gather_squares(table: &[f32], at: Self::I, below: usize) -> [Self::F; 4] {
+        // SAFETY: the caller keeps all lanes and their squares inside the table.
+        let (upper, lower) = unsafe {
+            (Self::gather_pairs(table, at), Self::gather_pairs(table, map(at, |k| k + below as i32)))
+        };
+        [upper.0, upper.1, lower.0, lower.1]
     }
 
     #[inline(always)]
@@ -300,5 +305,9 @@ impl<const N: usize> Lanes for Portable<N> {
     #[inline(always)]
     fn select_wide(mask: Self::M, yes: Self::D, no: Self::D) -> Self::D {
         choose(mask, yes, no)
+    }
+    #[inline(always)]
+    fn select_signed_wide(sign: Self::D, yes: Self::D, no: Self::D) -> Self::D {
+        choose(map(sign, |x| x < 0.0), yes, no)
     }
 }

@@ -71,7 +71,14 @@ impl Kernel for Everything<'_> {
             let at = i & L::splat_int(63);
             // SAFETY: 0..64, and the table has more numbers than that.
             let (one, pair) = unsafe { (L::gather(self.a, at, less), L::gather_pairs(self.b, at)) };
-            for x in [one, pair.0, pair.1] {
+            // SAFETY: as above.
+            let all = unsafe { L::gather_all(self.a, at) };
+            for x in [one, all, pair.0, pair.1] {
+                float(x, &mut results);
+            }
+            // SAFETY: 0..64, and the table has more numbers than that.
+            let square = unsafe { L::gather_squares(self.b, at, 70) };
+            for x in square {
                 float(x, &mut results);
             }
             let (da, db) = (L::widen(a), L::widen(b));
@@ -98,14 +105,12 @@ impl Kernel for Everything<'_> {
                 L::store(third, &mut packed);
                 assert!((0..width).all(|lane| packed[lane] == self.a[3 * lane + k]));
             }
-            for (group, four) in ca.chunks(4).enumerate() {
-                L::store(L::least_of_four(a), &mut packed);
-                let least = four.iter().copied().fold(f32::INFINITY, f32::min);
-                assert!(packed[4 * group..][..four.len()].iter().all(|&x| x == least));
-                L::store(L::largest_of_four(a), &mut packed);
-                let largest = four.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-                assert!(packed[4 * group..][..four.len()].iter().all(|&x| x == largest));
+            let mut packed_wide = [f64::NAN; 16];
+            assert_eq!(count, L::compress_wide(less, da, &mut packed_wide));
+            for (k, &lane) in chosen.iter().enumerate() {
+                assert_eq!(packed_wide[k], f64::from(ca[lane]));
             }
+            wide(L::select_signed_wide(da - db, da, db), &mut results);
             if out.is_empty() {
                 out = results;
             } else {

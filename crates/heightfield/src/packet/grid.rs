@@ -72,6 +72,15 @@ impl<L: Lanes> Grid<L> {
         L::select_int(L::eq_int(last, end), self.last - end, last + step)
     }
 
+    /// Whether the cell of this number is so many cells or more away from both ends of the grid.
+    #[inline(always)]
+    pub fn inner(&self, number: L::I, cells: usize) -> L::M {
+        let from_first = number - L::splat_int(cells as i32);
+        let room = self.last - L::splat_int(2 * cells as i32);
+        // Negative numbers count as large; small grids have no such cell.
+        L::eq_int(L::min_unsigned(from_first, room), from_first) & L::lt_int(L::splat_int(0), room)
+    }
+
     /// The number of a cell on any tile, a whole number. Never outside the grid, whatever the input.
     #[inline(always)]
     pub fn number(&self, cell: L::F) -> L::I {
@@ -103,15 +112,6 @@ impl<L: Lanes> Axis<L> {
     pub fn inverse_of(direction: L::F) -> L::F {
         let moving = L::lt(L::splat(1e-20), L::abs(direction));
         L::select(moving, L::splat(1.0) / direction, L::splat(BIG))
-    }
-
-    #[inline(always)]
-    fn refill(&self, chosen: L::M, start: &[f32], direction: &[f32], inverse: &[f32]) -> Self {
-        Self {
-            start: L::expand(chosen, start, self.start),
-            direction: L::expand(chosen, direction, self.direction),
-            inverse: L::expand(chosen, inverse, self.inverse),
-        }
     }
 }
 
@@ -165,7 +165,7 @@ impl<L: Lanes> Coarse<L> {
             + L::lookup(bound.offsets(), level);
         let at = L::min_unsigned(at, L::splat_int(bound.last()));
         // SAFETY: at most the last of the table.
-        let free = unsafe { L::gather(bound.drops(), at, self.running) };
+        let free = unsafe { L::gather_all(bound.drops(), at) };
         let (to_x, to_y) = (to_x * self.x.inverse, to_y * self.y.inverse);
         let cells = L::times_power(L::splat(1.0), level);
         let exit = L::mul_add(L::min(to_x, to_y), cells, self.drop + self.overshoot);
@@ -181,16 +181,5 @@ impl<L: Lanes> Coarse<L> {
         let highest = L::splat_int(bound.top() as i32);
         self.level = L::select_int(climb, L::min_int(level + step, highest), down);
         self.running = self.running & !failed;
-    }
-
-    /// Replaces the chosen lanes by the first numbers of the arrays, in order.
-    #[inline(always)]
-    pub fn refill(&mut self, chosen: L::M, from: [&[f32]; 8]) {
-        let x = self.x.refill(chosen, from[0], from[2], from[4]);
-        let y = self.y.refill(chosen, from[1], from[3], from[5]);
-        let drop = L::expand(chosen, from[6], self.drop);
-        let steps = L::select_int(chosen, L::splat_int(0), self.steps);
-        let level = L::to_int(L::expand(chosen, from[7], L::to_float(self.level)));
-        *self = Self { steps, ..Self::new(x, y, drop, level, self.running) };
     }
 }

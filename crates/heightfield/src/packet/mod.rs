@@ -1,12 +1,11 @@
 //! The exact search for many rays at once.
 //!
-//! A block of rays goes down in three stages. [`beams`] takes bundles of neighbours as far as all of
-//! them are free; [`coarse`] takes each ray on over a max pyramid, in `f32`, to within a cell of where
-//! the surface may be; [`cells`] walks it from cell to cell and solves the bilinear patch in `f64`.
-//! Rays that went through their cells without a hit take the last two stages again, packed together so
-//! that no lane idles. Only `f64` decides on a hit, and `f32` only on what is surely free: bounds
-//! have a margin for its rounding. The few rays that pass a corner of a cell too closely for it, and
-//! those that rise, are level or start on the surface, take the search for one ray.
+//! A block of rays goes down in two stages. [`beams`] takes bundles of neighbours as far as all of them are
+//! free. [`cells`] takes each ray on over a max pyramid, in `f32`, to within a cell of where the surface may
+//! be, then from cell to cell, and solves the bilinear patch in `f64`. Rays that went through their cells
+//! without a hit take the second stage again, packed together so that no lane idles. Only `f64` decides on a
+//! hit, and `f32` only on what is surely free: bounds have a margin for its rounding. Rays that rise, are
+//! level or start on the surface take the search for one ray.
 
 // Unchecked table reads.
 #![allow(unsafe_code)]
@@ -14,17 +13,18 @@
 mod beams;
 mod block;
 mod cells;
-mod coarse;
 mod grid;
 
 use crate::HeightField;
 use crate::chunk::{Chunk, Outcome};
 use crate::lanes::{Kernel, Lanes};
+use crate::order::RUN;
 use crate::rays::load;
-use block::{BATCH, Block, LEFT, Queue, Results};
+use beams::Bundles;
+use block::{BATCH, Block, LEFT, Results};
 use grid::Grid;
 
-/// Rounds of coarse and fine walks without new rays, after which the rays left take the search for one.
+/// Rounds of walks without new rays, after which the rays left take the search for one.
 const ROUNDS: usize = 1 << 14;
 
 /// Cells above which node numbers would not fit.
@@ -47,36 +47,42 @@ impl Kernel for Exact<'_, '_> {
         let [nx, ny] = field.cells();
         let n = chunk.origins.len();
         if chunk.from_surface || nx * ny > MOST_CELLS {
-            chunk.march_singly(field, 0..n, |_| true);
+            chunk.march_singly(field, 0..n);
             return;
         }
-        let mut block = Block::new();
-        let mut bundles = Queue::new();
         let mut results = Results::new(n);
-        descend::<L>(field, chunk, &mut block, &mut bundles, &mut results);
+        descend::<L>(field, chunk, &mut Block::new(), &mut Bundles::new(), &mut results);
         if chunk.cancelled() {
             return;
         }
-        write::<L>(field, chunk, &results);
-        chunk.march_singly(field, 0..n, |i| results.drop[i].is_nan());
+        let left = write::<L>(field, chunk, &results);
+        chunk.march_singly(field, left);
     }
 }
 
-/// Writes the hits.
+/// Writes the hits. Returns the numbers of the rays that need the search for one.
 #[inline(always)]
-fn write<L: Lanes>(field: &HeightField, chunk: &mut Chunk<'_>, results: &Results) {
+fn write<L: Lanes>(field: &HeightField, chunk: &mut Chunk<'_>, results: &Results) -> Vec<usize> {
     let n = chunk.origins.len();
     let highest = L::splat_wide(f64::from(field.pyramid().highest()));
+    let mut left = Vec::new();
     for at in (0..n).step_by(L::WIDTH) {
         let (origin, direction) = (load::<L>(chunk.origins, at), load::<L>(chunk.directions, at));
         let drop = L::load_wide(&results.drop[at..]);
         let t = (drop - (highest - origin[2])) * (L::splat_wide(-1.0) / direction[2]);
+        let active = L::first(n - at);
         // False for NaN.
-        let hit = L::first(n - at) & L::le_wide(drop, drop);
+        let hit = active & L::le_wide(drop, drop);
         let outcome =
             Outcome::<L> { hit, unconverged: L::first(0), t, steps: L::load_int(&results.steps[at..]) };
         chunk.write_all(field, at, hit, &outcome, origin, direction);
+        let mut others = L::bits(active & !hit);
+        while others != 0 {
+            left.push(at + others.trailing_zeros() as usize);
+            others &= others - 1;
+        }
     }
+    left
 }
 
 /// Finds the hits of the rays of a chunk. New rays are taken in while others still look, for a few that
@@ -86,26 +92,31 @@ fn descend<L: Lanes>(
     field: &HeightField,
     chunk: &Chunk<'_>,
     block: &mut Block,
-    bundles: &mut Queue,
+    bundles: &mut Bundles,
     results: &mut Results,
 ) {
     let margins = field.margins();
     let gx = Grid::<L>::new(field.cells()[0], field.is_periodic());
     let gy = Grid::<L>::new(field.cells()[1], field.is_periodic());
-    let n = chunk.origins.len();
+    let places = if chunk.order.is_empty() { chunk.origins.len() } else { chunk.order.len() * RUN };
     let (mut next, mut rounds) = (0, 0);
     while rounds < ROUNDS && !chunk.cancelled() {
-        if next < n && block.queue.len <= LEFT {
-            let to = (next + BATCH).min(n);
-            let old = block.queue.len;
-            block.fill::<L>(field, chunk, next..to);
-            beams::descend::<L>(&mut block.queue, old, bundles, margins, &gx, &gy);
+        let old = block.len;
+        // New rays begin a vector, so that runs stay together.
+        let new = old.next_multiple_of(L::WIDTH);
+        block.len = new;
+        if next < places && old <= LEFT {
+            let to = (next + BATCH).min(places);
+            block.fill::<L>(field, chunk, next..to, bundles);
+            bundles.descend::<L>(block, margins, &gx, &gy);
             (next, rounds) = (to, 0);
-        } else if block.queue.len == 0 {
+        } else if old == 0 {
             return;
         }
-        coarse::walk::<L>(&mut block.queue, margins.narrowest(), &gx, &gy);
-        cells::walk::<L>(block, field, results);
+        let len = std::mem::take(&mut block.len);
+        for slots in [0..old, new..len] {
+            cells::walk::<L>(block, slots, field, &gx, &gy, results);
+        }
         rounds += 1;
     }
 }
