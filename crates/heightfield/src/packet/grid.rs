@@ -110,7 +110,8 @@ impl<L: Lanes> Axis<L> {
     /// 1 / direction in cells.
     #[inline(always)]
     pub fn inverse_of(direction: L::F) -> L::F {
-        let moving = L::lt(L::splat(1e-20), L::abs(direction));
+        // Below that, the inverse would be larger than what stands for "never".
+        let moving = L::lt(L::splat(1.0 / BIG), L::abs(direction));
         L::select(moving, L::splat(1.0) / direction, L::splat(BIG))
     }
 }
