@@ -42,11 +42,16 @@ fn first_below(start: vec3f, delta: vec3f, layers: i32, clear: f32) -> Bracket {
     return Bracket(false, above, 1.0, gap_above, gap_above, u32(layers - first + 1));
 }
 
-// Whether any sample of a segment that leaves the surface lies strictly below it. A start below the
-// surface is lifted onto it: searches that stop at a layer return hits up to a layer too deep, and from
-// there a surface would shadow itself. until: from here on nothing is as high as the segment.
+// How far a start below the surface is lifted to lie on it: searches return hits up to a layer too deep, or what
+// rounding takes, and from there a surface would shadow itself.
+fn lift_from(start: vec3f) -> vec3f {
+    return vec3f(0.0, 0.0, max(height_at(start.xy) - start.z, 0.0));
+}
+
+// Whether any sample of a segment that leaves the surface lies strictly below it. until: from here on nothing is as high
+// as the segment.
 fn any_below(start: vec3f, delta: vec3f, layers: i32, until: f32) -> bool {
-    let lift = vec3f(0.0, 0.0, max(height_at(start.xy) - start.z, 0.0));
+    let lift = lift_from(start);
     let last = min(i32(ceil(until * f32(layers))), layers);
     for (var i = 1; i <= last; i++) {
         if gap_at(start + lift, delta - lift, f32(i) / f32(layers)) < 0.0 {

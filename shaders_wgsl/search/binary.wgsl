@@ -29,10 +29,11 @@ fn search(start: vec3f, delta: vec3f, cos_theta: f32, stretch: vec2f) -> Found {
 
 fn occluded(start: vec3f, delta: vec3f, cos_theta: f32, stretch: vec2f) -> bool {
     // Halving towards the surface; closer than 1/256 the surface shadows itself by rounding.
+    let lift = lift_from(start);
     var far = 1.0;
     for (var i = 0; i < min(steps, 8); i++) {
         far *= 0.5;
-        if gap_at(start, delta, far) < 0.0 {
+        if gap_at(start + lift, delta - lift, far) < 0.0 {
             return true;
         }
     }

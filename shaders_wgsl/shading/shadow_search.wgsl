@@ -7,6 +7,9 @@
 #import "lib/texture_ray.wgsl"
 
 const SHADOW_RAYS: u32 = 1u;
+// Heights between the surface and a start that lies on it, for searches that end on it: ON_SURFACE of search/exact.wgsl
+// and of lib/cell_walk.wgsl.
+const SETTLED: f32 = 1e-3;
 
 // Without it no shadow ray is compiled.
 override cast_shadows: bool = true;
@@ -44,7 +47,16 @@ fn hidden(point: ShadowPoint, to_light: vec3f, distant: bool) -> Hidden {
 
 // Where along a segment that leaves the surface nothing stands in its way any more; 0 where nothing ever does: it
 // starts above all that it passes, or rises faster than any of it.
-fn clears(start: vec3f, delta: vec3f) -> f32 {
+fn clears(place: vec3f, delta: vec3f) -> f32 {
+    var start = place;
+    // Searches that end on the surface let what starts close to it start on it; what is deeper is hidden where it is.
+    // Those with layers lift what starts below, and the rest of the segment rises by so much less.
+    var below = height_at(start.xy) - start.z;
+    let settles = slack(1.0) == 0.0;
+    if settles && abs(below) <= SETTLED {
+        start.z += below;
+        below = 0.0;
+    }
     let top = start.z + delta.z;
     let over = ground_ray(start, delta);
     var high = clamp(draw_info().span.y, start.z, top);
@@ -52,9 +64,6 @@ fn clears(start: vec3f, delta: vec3f) -> f32 {
     let node = ground_node(over, start.z, high);
     high = clamp(ground_heights(node).y, start.z, high);
     var rise = dot(ground_slopes(node), abs(delta.xy) * vec2f(material.map_width, material.map_height));
-    if slack(1.0) > 0.0 {
-        // Searches with layers lift what starts below the surface, and the rest of the segment rises by so much less.
-        rise += max(height_at(start.xy) - start.z, 0.0);
-    }
+    rise += select(max(below, 0.0), delta.z, settles && below > 0.0);
     return select((high - start.z) / delta.z, 0.0, delta.z > rise);
 }

@@ -4,6 +4,7 @@
 //! Fabio Policarpo, Manuel Oliveira and Joao Comba, Real-Time Relief Mapping on Arbitrary Polygonal
 //! Surfaces, I3D 2005 (its second phase alone).
 
+use super::layers::lifted;
 use crate::lanes::Lanes;
 use crate::wide::{Findings, Heights, Segments, WideSearch};
 
@@ -34,6 +35,7 @@ impl WideSearch for Binary {
     #[inline(always)]
     fn occluded<L: Lanes>(&self, heights: &Heights<'_, L>, rays: &Segments<L>) -> L::M {
         // Halving towards the surface; closer than 1/256 the surface shadows itself by rounding.
+        let rays = lifted(heights, rays);
         let mut far = 1.0;
         let mut blocked = L::first(0);
         for _ in 0..self.steps.min(8) {

@@ -121,15 +121,11 @@ pub fn first_below<L: Lanes>(heights: &Heights<'_, L>, rays: &Segments<L>, layer
 
 /// Whether any sample of a segment that leaves the surface lies strictly below it.
 ///
-/// A start below the surface is lifted onto it: searches that stop at a layer return hits up to a layer
-/// too deep, and from there a surface would shadow itself.
+/// Starts below the surface are [`lifted`].
 #[inline(always)]
 pub fn any_below<L: Lanes>(heights: &Heights<'_, L>, rays: &Segments<L>, layers: Layers<L>) -> L::M {
     let zero = L::splat(0.0);
-    let mut rays = *rays;
-    let lift = L::max(heights.sample(rays.start[0], rays.start[1]) - rays.start[2], zero);
-    rays.start[2] = rays.start[2] + lift;
-    rays.delta[2] = rays.delta[2] - lift;
+    let rays = lifted(heights, rays);
     let mut blocked = L::first(0);
     for i in 1..=layers.most {
         let counts = L::le(L::splat(i as f32), layers.count);
@@ -139,6 +135,17 @@ pub fn any_below<L: Lanes>(heights: &Heights<'_, L>, rays: &Segments<L>, layers:
         }
     }
     blocked
+}
+
+/// The segments, starts below the surface lifted onto it: searches return hits up to a layer too deep, or what rounding
+/// takes, and from there a surface would shadow itself.
+#[inline(always)]
+pub fn lifted<L: Lanes>(heights: &Heights<'_, L>, rays: &Segments<L>) -> Segments<L> {
+    let mut rays = *rays;
+    let lift = L::max(heights.sample(rays.start[0], rays.start[1]) - rays.start[2], L::splat(0.0));
+    rays.start[2] = rays.start[2] + lift;
+    rays.delta[2] = rays.delta[2] - lift;
+    rays
 }
 
 /// Where the chord between the two samples of a bracket reaches zero.
