@@ -13,12 +13,13 @@ import pytest
 
 import bumpwgpu as bw
 from bumpwgpu import _bumpwgpu
+from bumpwgpu._stress_pictures import picture_checks
 
 RAYS = 16
 
 
 def march_only(march: Any = None, technique: Any = "exact", only: str = "grazing") -> bw.StressResult:
-    return bw.stress(technique, maps=[], frames=[], march=march, rays=RAYS, only=only)
+    return bw.stress(technique, maps=[], frames=[], march=march, rays=RAYS, only=only, device="cpu")
 
 
 def bake_only(name: str, bake: Any = None) -> bw.StressResult:
@@ -31,7 +32,7 @@ def checks(result: bw.StressResult) -> set[str]:
 
 @pytest.fixture(scope="module")
 def sound() -> bw.StressResult:
-    return bw.stress(["relief", "exact"], maps=["curvature"], frames=["mikktspace"], rays=RAYS)
+    return bw.stress(["relief", "exact"], maps=["curvature"], frames=["mikktspace"], rays=RAYS, device="cpu")
 
 
 def test_what_is_sound_passes(sound: bw.StressResult) -> None:
@@ -39,7 +40,8 @@ def test_what_is_sound_passes(sound: bw.StressResult) -> None:
     assert not sound.failures
     groups = {row["group"] for row in sound.rows}
     assert groups == {
-        "grazing", "offset", "scale", "map", "cell border", "length", "far start", "mesh",
+        "grazing", "offset", "scale", "map", "cell border", "length", "far start", "camera", "bundles",
+        "shadow", "mesh",
     }  # fmt: skip
     names = {row["case"] for row in sound.rows}
     assert {"89.99 degrees, repeat", "1e+06 tiles, f64", "denormal, mirror", "1 x N, clamp"} <= names
@@ -147,6 +149,70 @@ def test_small_faults_of_hits_are_found() -> None:
     assert "uv on the ray" in checks(march_only(flipped))
 
 
+@pytest.mark.parametrize(
+    "technique",
+    ["parallax", "parallax_limited", "steep", "steep_linear", "steep_exponential", "binary", "relief", "pom"],
+)
+def test_answers_that_are_not_the_recipe_s_are_found(technique: str) -> None:
+    def later(height_map: Any, origins: Any, directions: Any, chosen: Any, **options: Any) -> Any:
+        # A tenth of what a step of relief mapping's last halving is long.
+        hits = bw.march(height_map, origins, directions, chosen, **options)
+        t = hits.t + np.float32(1e-5)
+        return shifted(
+            hits,
+            t,
+            uv=origins[:, :2] + t[:, None] * directions[:, :2],
+            z=origins[:, 2] + t * directions[:, 2],
+        )
+
+    assert "recipe" in checks(march_only(later, technique))
+    assert march_only(technique=technique)
+
+
+@pytest.mark.parametrize("lift", [0.001, 0.01])
+def test_light_that_gets_past_what_touches_it_is_found(lift: float) -> None:
+    def biased(height_map: Any, origins: Any, directions: Any, technique: Any, **options: Any) -> Any:
+        # Started above the surface, so that it does not hide itself: as shadow maps do.
+        return bw.march(
+            height_map, origins + origins.dtype.type([0, 0, lift]), directions, technique, **options
+        )
+
+    found = bw.stress("exact", maps=[], frames=[], march=biased, only="shadow")
+    assert checks(found) == {"hidden where it should be"}
+
+
+def test_surfaces_that_hide_themselves_are_found() -> None:
+    def sunk(height_map: Any, origins: Any, directions: Any, technique: Any, **options: Any) -> Any:
+        options = {**options, "from_surface": False}
+        return bw.march(height_map, origins, directions, technique, **options)
+
+    assert checks(march_only(sunk, only="shadow")) == {"does not hide itself"}
+
+
+def test_lone_posts_that_are_passed_over_are_found() -> None:
+    def blind(height_map: Any, origins: Any, directions: Any, technique: Any, **options: Any) -> Any:
+        # One ray of each square of eight by eight sees nothing higher than the ground.
+        hits = bw.march(height_map, origins, directions, technique, **options)
+        at = np.arange(len(origins))
+        corner = (at % 8 == 0) & (at // 256 % 8 == 0)
+        ground = bw.HeightMap(np.zeros((1, 1), np.float32))
+        other = bw.march(ground, origins, directions, technique, **options)
+        kept = {
+            name: np.where(corner[:, None] if np.ndim(getattr(hits, name)) > 1 else corner,
+                           getattr(other, name), getattr(hits, name))
+            for name in ("t", "uv", "z", "normal", "status")
+        }  # fmt: skip
+        return SimpleNamespace(**kept)
+
+    assert "nothing skipped" in checks(march_only(blind, only="bundles"))
+
+
+def test_a_hit_a_rounding_away_from_a_wall_is_none_too_far_off() -> None:
+    # Rays of a thousand tiles: a rounding of t takes them into the next cell, which may be much steeper.
+    made = bw.stress("exact", maps=[], frames=[], device="cpu", only="1000")
+    assert made, str(made)
+
+
 def test_small_faults_of_hit_normals_are_found() -> None:
     def steeper(*rays: Any, **options: Any) -> Any:
         hits = bw.march(*rays, **options)
@@ -243,8 +309,12 @@ def test_a_swapped_green_is_found() -> None:
     def swapped(*arguments: Any, **options: Any) -> Any:
         return bw.bake(*arguments, convention="directx", **options)
 
+    def in_files(*arguments: Any, **options: Any) -> Any:
+        return bw.bake(*arguments, convention="directx" if "dtype" in options else "opengl", **options)
+
     for name in ("normal", "relief", "normal_xy"):
         assert any(check.startswith("formula") for check in checks(bake_only(name, swapped))), name
+        assert checks(bake_only(name, in_files)) == {"numbers of 8 bits", "numbers of 16 bits"}, name
 
 
 @pytest.mark.parametrize("name", ["cone", "relaxed_cone"])
@@ -382,7 +452,7 @@ def test_senseless_settings_are_refused(arguments: dict[str, Any], error: type, 
 def test_answers_that_hang_on_a_rounding_are_told_from_faults() -> None:
     # At 89.99 degrees a step of interval is hundreds of texels long, and its bracket holds many hits.
     for technique in ("interval", "steep"):
-        made = bw.stress(technique, maps=[], frames=[], rays=128, only="89.99")
+        made = bw.stress(technique, maps=[], frames=[], rays=128, only="89.99", device="cpu")
         assert made, str(made)
 
     def leaning(height_map: Any, origins: Any, directions: Any, technique: Any, **options: Any) -> Any:
@@ -402,5 +472,30 @@ def test_everything_passes() -> None:
 
 @pytest.mark.gpu
 def test_the_device_passes() -> None:
-    made = bw.stress("exact", maps=[], frames=[], rays=RAYS, device="gpu")
+    made = bw.stress(["exact", "relief"], maps=[], frames=[], rays=RAYS, only="grazing")
     assert made, str(made)
+    subjects = {row["subject"] for row in made.rows}
+    assert subjects == {"march exact", "march relief", "march exact, device", "march relief, device"}
+
+
+@pytest.mark.gpu
+@pytest.mark.parametrize("technique", ["exact", "relief"])
+def test_faults_of_pictures_are_found(technique: str) -> None:
+    def found(change: Any) -> set[str]:
+        def drawn(*arguments: Any, **options: Any) -> Any:
+            aovs = {name: value.copy() for name, value in bw.render(*arguments, **options).aovs.items()}
+            change(aovs)
+            return SimpleNamespace(aovs=aovs)
+
+        rows = picture_checks(drawn, bw.techniques.get(technique), 0)
+        return {check["check"] for _, check in rows if not check["passed"]}
+
+    assert found(lambda aovs: None) == set()
+    assert found(lambda aovs: aovs["shadow"].fill(0.0)) == {"hidden where it should be"}
+    assert found(lambda aovs: aovs["shadow"].fill(1.0)) == {"does not hide itself"}
+    assert "uv on the ray" in found(lambda aovs: aovs["uv"].__iadd__(np.float32(0.0001)))
+    if technique == "exact":
+        swapped = found(lambda aovs: aovs["normal"].__imul__(np.float32([1, -1, 1])))
+        assert "normal" in swapped
+        sunk = found(lambda aovs: aovs["height"].__isub__(np.float32(0.001)))
+        assert {"on the surface", "uv on the ray"} <= sunk

@@ -57,7 +57,10 @@ def stress(
         str, typer.Option(help="Tangent methods, with commas between; none.", show_default="all")
     ] = "",
     only: Annotated[str | None, typer.Option(help="Only cases whose group or name contains this.")] = None,
-    gpu: Annotated[bool, typer.Option("--gpu", help="Run searches on the device.")] = False,
+    gpu: Annotated[
+        bool | None,
+        typer.Option("--gpu/--cpu", help="Run searches on the device or the processor.", show_default="both"),
+    ] = None,
     rays: Annotated[int, typer.Option(help="Rays of a case.", min=8, max=65536)] = 128,
     seed: Annotated[int, typer.Option(help="Fixes rays and maps.", min=0)] = 0,
     rows: Annotated[Path | None, typer.Option(help="Write all rows: .json or .csv.")] = None,
@@ -82,7 +85,7 @@ def stress(
                 maps=baked,
                 frames=methods,
                 only=only,
-                device="gpu" if gpu else "cpu",
+                device="all" if gpu is None else "gpu" if gpu else "cpu",
                 rays=rays,
                 seed=seed,
                 progress=advance,
@@ -95,6 +98,8 @@ def stress(
         summary = result.summary()
         out.show(_stress_table(summary if verbose else _worst_of_subjects(summary)))
         out.say(f"{len(result.rows)} checks, {len(result.failures)} failed")
+        if gpu is None and chosen != [] and "device" not in result.environment:
+            out.say("no Vulkan device answers: searches ran on the processor alone")
         for path in files:
             out.say(str(path))
         out.result(

@@ -132,6 +132,22 @@ def _normals(bake: Bake, name: str, source: HeightMap) -> Iterator[Check]:
             )
         rounding = np.degrees(_lost(source) * truth[..., 2] ** 2)
         yield _check(f"formula, {kernel}", [np.maximum(angle - rounding, 0.0)], "degrees", limit)
+    yield from _whole_numbers(bake, name, source)
+
+
+def _whole_numbers(bake: Bake, name: str, source: HeightMap) -> Iterator[Check]:
+    """Numbers of files: which is off by more than half of one, besides what 32 bits are off by before."""
+    truth = _true_normals(source, *_TAPS["sobel3"])[..., : 2 if name == "normal_xy" else 3]
+    for bits in (8, 16):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", BumpWarning)
+            made = np.asarray(bake(source, (name,), dtype=f"uint{bits}")[name])
+        most = 2.0**bits - 1.0
+        slack = 0.5 * most * (np.radians(1e-3) + _lost(source))
+        off = [np.abs(made[..., : truth.shape[-1]] - (0.5 + 0.5 * truth) * most)]
+        if name == "relief":
+            off.append(np.abs(made[..., 3] - source.array.astype(np.float64) * most))
+        yield _check(f"numbers of {bits} bits", off, "numbers", 0.5 + slack)
 
 
 def _lost(source: HeightMap) -> float:

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ._stress_surface import surface
 from .heightmap import HeightMap, Wrap
 
-__all__ = ["ANGLES", "OFFSETS", "RayCase", "hard_maps", "ray_cases"]
+__all__ = ["ANGLES", "OFFSETS", "RayCase", "hard_maps", "picture_maps", "ray_cases", "shadow_cases"]
 
 #: Angles from the normal, degrees.
 ANGLES = (0.0, 45.0, 70.0, 85.0, 89.0, 89.9, 89.99)
@@ -22,6 +23,16 @@ OFFSETS = (0.0, 1.0, 16.0, 1e3, 1e4, 1e5, 1e6)
 SCALES = (1e-6, 1e-3, 1.0, 1e3, 1e6)
 WRAPS: tuple[Wrap, ...] = ("repeat", "clamp", "mirror")
 _SIDE = 32
+#: Angles of cameras, degrees from the normal; their pixels, and texels of what they see. Searches may bundle
+#: the rays of a camera, which takes this many.
+CAMERA_ANGLES = (45.0, 80.0)
+_PIXELS, _SEEN = (64, 32), 64
+#: A camera that bundles must not look past posts with, which stand alone: its pixels, texels, posts, and
+#: texels between rays on the lid. Eight by eight rays are then as wide as a bound of power-of-two width just
+#: holds.
+_BUNDLES, _FOREST, _POSTS, _APART = (256, 64), 128, 60, 0.9
+#: Angles of lights, degrees from the normal.
+LIGHT_ANGLES = (45.0, 70.0, 85.0)
 
 
 @dataclass(frozen=True)
@@ -72,6 +83,35 @@ def ray_cases(seed: int, rays: int) -> Iterator[RayCase]:
     origins, directions = _rays(rng, rays, 0.5)
     origins -= directions * rng.uniform(1.0, 1000.0, (rays, 1))
     yield _single("far start", "up to 1000 heights above", tiled, origins, directions)
+    seen = _rough(rng, _SEEN)
+    for wrap in WRAPS:
+        here = HeightMap(seen, scale=0.1, wrap=wrap)
+        for angle in CAMERA_ANGLES:
+            rows = _camera(_PIXELS, 0.5 / _SEEN, _run(0.1, angle))
+            yield _single("camera", f"{angle:g} degrees, {wrap}", here, *rows)
+    posts = np.zeros((_FOREST, _FOREST), np.float32)
+    posts[tuple(rng.integers(0, _FOREST, (2, _POSTS)))] = rng.uniform(0.1, 0.9, _POSTS)
+    rows = _camera(_BUNDLES, _APART / _FOREST, _run(0.1, 25.0))
+    yield _single("bundles", "among posts", HeightMap(posts, scale=0.1), *rows)
+
+
+def shadow_cases(seed: int, rays: int) -> Iterator[RayCase]:
+    """Rays from points of a rough surface up to lights."""
+    rng = np.random.default_rng(seed + 3)
+    rough = _rough(rng)
+    for wrap in WRAPS:
+        here = HeightMap(rough, scale=0.1, wrap=wrap)
+        for angle in LIGHT_ANGLES:
+            origins, directions = _rays(rng, 8 * rays, _run(0.1, angle))
+            origins[:, :2] = origins[:, :2].astype(np.float32)
+            origins[:, 2] = surface(here, origins[:, 0], origins[:, 1])
+            yield _single("shadow", f"light at {angle:g}, {wrap}", here, origins, -directions)
+
+
+def picture_maps(seed: int) -> dict[str, HeightMap]:
+    """A rough surface in every wrap, to be drawn."""
+    rough = _rough(np.random.default_rng(seed + 4))
+    return {wrap: HeightMap(rough, scale=0.1, wrap=wrap) for wrap in WRAPS}
 
 
 def hard_maps(seed: int) -> dict[str, NDArray[np.float32]]:
@@ -101,12 +141,12 @@ def hard_maps(seed: int) -> dict[str, NDArray[np.float32]]:
     return {name: np.ascontiguousarray(heights, np.float32) for name, heights in maps.items()}
 
 
-def _rough(rng: np.random.Generator) -> NDArray[np.float32]:
+def _rough(rng: np.random.Generator, side: int = _SIDE) -> NDArray[np.float32]:
     """Slopes, walls, and posts of one texel."""
-    y, x = np.mgrid[0:_SIDE, 0:_SIDE] / _SIDE
-    heights = 0.4 + 0.25 * np.sin(2 * np.pi * (x + 2 * y)) + 0.1 * rng.random((_SIDE, _SIDE))
+    y, x = np.mgrid[0:side, 0:side] / side
+    heights = 0.4 + 0.25 * np.sin(2 * np.pi * (x + 2 * y)) + 0.1 * rng.random((side, side))
     heights[12:20, 5:14] = 0.15
-    heights[rng.integers(0, _SIDE, 9), rng.integers(0, _SIDE, 9)] = 1.0
+    heights[rng.integers(0, side, 9), rng.integers(0, side, 9)] = 1.0
     rough: NDArray[np.float32] = np.clip(heights, 0.0, 1.0).astype(np.float32)
     return rough
 
@@ -127,6 +167,17 @@ def _rays(
     flat = np.stack([np.cos(turn), np.sin(turn)], axis=1)
     flat[np.abs(flat) < 1e-9] = 0.0
     return origins, np.concatenate([run * flat, -np.ones((count, 1))], axis=1)
+
+
+def _camera(
+    size: tuple[int, int], apart: float, run: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The rays of a camera, row by row, so many tiles apart on the lid and twice as many on the floor."""
+    width, height = size
+    x, y = (part.ravel() for part in np.meshgrid(np.arange(width), np.arange(height)))
+    ways = np.stack([x - 0.5 * width, y - 0.5 * height, np.zeros(len(x))], axis=1) * apart
+    directions = ways + run * np.array([0.8, -0.6, 0.0]) - np.array([0.0, 0.0, 1.0])
+    return np.tile([0.3, 0.6, 2.0], (len(x), 1)), directions
 
 
 def _border_cases(rng: np.random.Generator, rays: int, tiled: HeightMap) -> Iterator[RayCase]:

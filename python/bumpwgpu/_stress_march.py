@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from . import _bumpwgpu
 from ._stress_cases import RayCase
+from ._stress_recipes import RECIPES, follow
 from ._stress_rows import Check, failed, row
 from ._stress_surface import gradients
 from .errors import BumpWarning
@@ -67,7 +68,9 @@ def march_checks(march: March, technique: Technique, case: RayCase, device: str)
     yield _normals(case, np.where(found[:, None], uv, 0.0), np.where(found[:, None], normal, np.nan))
     if guaranteed:
         yield from _judged(case, t, status)
-    elif case.name.startswith("flat 0.5"):
+    if technique.name in RECIPES:
+        yield _by_recipe(march, technique, case, t, device)
+    if not guaranteed and case.name.startswith("flat 0.5"):
         yield _worst(
             case, "flat ground", np.where(found, np.abs(along - 0.5), 0.0), "heights", _flat_limit(technique)
         )
@@ -136,13 +139,19 @@ def _answers(case: RayCase, t: NDArray[Any], status: NDArray[Any], most_texels: 
 
 def _judged(case: RayCase, t: NDArray[np.float64], status: NDArray[np.float64]) -> Iterator[Check]:
     """Against the judge, which shares no code with the searches."""
-    truth, gap, skipped, rate = _bumpwgpu.judge(
-        case.height_map.array,
-        case.height_map.wrap,
-        np.ascontiguousarray(case.origins),
-        np.ascontiguousarray(case.directions),
-        t,
-    )
+
+    def judge(origins: NDArray[np.float64], directions: NDArray[np.float64], t: NDArray[np.float64]) -> Any:
+        rays = np.ascontiguousarray(origins), np.ascontiguousarray(directions)
+        return _bumpwgpu.judge(case.height_map.array, case.height_map.wrap, *rays, t)
+
+    truth, gap, skipped, rate = judge(case.origins, case.directions, t)
+    # Rounding may take a place over the side of its cell, and the height changes as fast as on the steeper
+    # one.
+    found = np.flatnonzero(np.isfinite(t))
+    for beside in (1.0 - MOST_ULPS * EPSILON, 1.0 + MOST_ULPS * EPSILON):
+        ways = case.directions[found]
+        places = case.origins[found] + (t[found] * beside)[:, None] * ways
+        rate[found] = np.fmax(rate[found], judge(places, ways, np.zeros(len(found)))[3])
     known = ~np.isnan(truth)
     finite = np.isfinite(t)
     # What rounding origin, direction and t to 32 bits does to the height over the surface.
@@ -157,6 +166,20 @@ def _judged(case: RayCase, t: NDArray[np.float64], status: NDArray[np.float64]) 
     texels = np.where(both, np.abs(t - np.where(both, truth, 0.0)) * run, 0.0)
     median = float(np.median(texels[both])) if both.any() else 0.0
     yield {**_worst(case, "error", texels, "texels", np.inf), "median": median}
+
+
+def _by_recipe(
+    march: March, technique: Technique, case: RayCase, t: NDArray[np.float64], device: str
+) -> Check:
+    """Share of rays whose answer is not that of the recipe in double precision."""
+    change, changed = np.full(len(t), np.inf), np.ones(len(t), bool)
+    for truth, allowed in follow(technique, case):
+        off = np.where(np.isfinite(t), np.abs(t - truth), np.inf)
+        change, changed = np.fmin(change, off), changed & (off > allowed)
+    if changed.mean() > MOST_CHANGED:
+        changed &= _well_posed(march, technique, case, t, device, allowed)
+    check = _worst(case, "recipe", np.where(changed, change, 0.0), "share of rays", MOST_CHANGED)
+    return {**check, "worst": float(changed.mean()), "passed": bool(changed.mean() <= MOST_CHANGED)}
 
 
 def _flat_limit(technique: Technique) -> float:
@@ -198,9 +221,8 @@ def _symmetries(
         # Who else is asked about must not matter: rays share lanes, bounds and blocks.
         yield _same(march, technique, case, t, device, "in reverse", heights, None, None, reverse=True)
     if case.group == "length":
-        yield _same(
-            march, technique, case, t * 8.0, device, "longer rays", heights, None, case.directions / 8.0
-        )
+        shorter = case.directions / 8.0
+        yield _same(march, technique, case, t, device, "longer rays", heights, None, shorter, longer=8.0)
     if case.group == "offset" and case.dtype is np.float32:
         yield _same(march, technique, case, t, device, "f64 input", heights, None, None)
 
@@ -216,8 +238,12 @@ def _same(
     origins: NDArray[np.float64] | None,
     directions: NDArray[np.float64] | None,
     reverse: bool = False,
+    longer: float = 1.0,
 ) -> Check:
-    """Share of rays for which an equal question has another answer, by a hundredth of a texel."""
+    """Share of rays for which an equal question has another answer, by a hundredth of a texel.
+
+    `longer`: how many times t should be what it was.
+    """
     start = case.origins if origins is None else origins
     along = case.directions if directions is None else directions
     order = slice(None, None, -1 if reverse else 1)
@@ -228,9 +254,10 @@ def _same(
         other = _run(march, technique, height_map, start[order], along[order], dtype, device)
     except Exception as error:  # as above
         return failed(name, f"{type(error).__name__}: {error}")
-    again = np.asarray(other.t, np.float64)[order]
+    again = np.asarray(other.t, np.float64)[order] / longer
     rows, columns = case.height_map.shape
-    run = np.hypot(along[:, 0] * columns, along[:, 1] * rows) + np.abs(along[:, 2])
+    run = np.hypot(case.directions[:, 0] * columns, case.directions[:, 1] * rows)
+    run += np.abs(case.directions[:, 2])
     both = np.isfinite(t) & np.isfinite(again)
     with np.errstate(invalid="ignore"):
         change = np.where(both, np.abs(t - again) * run, (np.isfinite(t) != np.isfinite(again)) * 1e9)
@@ -241,7 +268,7 @@ def _same(
         # A search that promises no first hit may follow from its samples to another one when these move by a
         # rounding, and at the lowest angles each step is hundreds of texels long. Then the question itself
         # has no one answer in 32 bits: only rays count whose answer stays where it is under such moves.
-        changed &= _well_posed(march, technique, case, t, device, 0.5 * allowed)
+        changed &= _well_posed(march, technique, case, t, device, 0.5 * allowed / run)
     check = _worst(case, name, np.where(changed, change, 0.0), "share of rays", most)
     return {**check, "worst": float(changed.mean()), "passed": bool(changed.mean() <= most)}
 
@@ -254,10 +281,9 @@ def _well_posed(
     device: str,
     allowed: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
-    """Rays whose answer does not change when they move by two roundings of the places that they pass."""
-    rows, columns = case.height_map.shape
-    run = np.hypot(case.directions[:, 0] * columns, case.directions[:, 1] * rows)
-    run += np.abs(case.directions[:, 2])
+    """Rays whose t does not change by more than allowed when they move by two roundings of the places they
+    pass.
+    """
     passed = np.abs(case.origins[:, :2]) + np.abs(case.directions[:, :2] / case.directions[:, 2:])
     stays = np.ones(len(t), bool)
     for signs in itertools.product((-1.0, 1.0), repeat=2):
@@ -267,7 +293,7 @@ def _well_posed(
         moved = np.asarray(hits.t, np.float64)
         both = np.isfinite(t) & np.isfinite(moved)
         with np.errstate(invalid="ignore"):
-            change = np.where(both, np.abs(t - moved) * run, (np.isfinite(t) != np.isfinite(moved)) * 1e9)
+            change = np.where(both, np.abs(t - moved), (np.isfinite(t) != np.isfinite(moved)) * 1e300)
         stays &= change <= allowed
     return stays
 

@@ -13,10 +13,10 @@ def row(name: str, worst: float, unit: str, limit: float, where: str) -> Check:
     """One check; it is passed when the worst value is within the limit."""
     return {
         "check": name,
-        "worst": worst,
+        "worst": float(worst),
         "unit": unit,
-        "limit": limit,
-        "passed": worst <= limit,
+        "limit": float(limit),
+        "passed": bool(worst <= limit),
         "where": where,
     }
 

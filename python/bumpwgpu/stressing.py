@@ -12,19 +12,23 @@ from typing import Any, Literal
 
 import numpy as np
 
+from . import _bumpwgpu
 from . import techniques as _techniques
 from ._atomic import replace_file
 from ._checks import choice, whole
 from ._csv import csv_bytes
 from ._map_info import MAPS
 from ._stress_bake import bake_checks
-from ._stress_cases import hard_maps, ray_cases
+from ._stress_cases import RayCase, hard_maps, ray_cases, shadow_cases
 from ._stress_frames import frame_cases, frame_checks
 from ._stress_march import GUARANTEED, march_checks
+from ._stress_pictures import picture_checks
+from ._stress_shadows import shadow_checks
 from .baking import bake as bake_maps
 from .frames import TANGENT_METHODS
 from .frames import tangents as find_tangents
 from .marching import march as march_rays
+from .rendering import render as render_picture
 from .system import machine
 from .techniques import Technique
 
@@ -41,10 +45,10 @@ class StressResult:
     Attributes
     ----------
     rows : list of dict
-        One for each subject, case and check: ``subject`` ("march exact", "bake cone", "frames
-        mikktspace"), ``group`` and ``case``, ``check``, ``worst`` value with its ``unit`` and ``limit``
-        (inf: reported, not judged), ``passed``, and ``where``; for rays seen at an angle or far away
-        ``at``, degrees from the normal or tiles.
+        One for each subject, case and check: ``subject`` ("march exact", "march exact, device", "picture
+        exact", "bake cone", "frames mikktspace"), ``group`` and ``case``, ``check``, ``worst`` value with its
+        ``unit`` and ``limit`` (inf: reported, not judged), ``passed``, and ``where``; for rays seen at an
+        angle or far away ``at``, degrees from the normal or tiles.
     environment : dict
         Device, versions, settings.
     """
@@ -163,7 +167,7 @@ def stress(
     bake: Callable[..., Any] | None = None,
     tangents: Callable[..., Any] | None = None,
     only: str | None = None,
-    device: Literal["cpu", "gpu"] = "cpu",
+    device: Literal["all", "cpu", "gpu"] = "all",
     rays: int = 128,
     seed: int = 0,
     progress: Progress | None = None,
@@ -174,9 +178,11 @@ def stress(
     1e-6 to 1e6, rays along cell borders and through corners, directions of 1e-18 to 1e18, single-precision
     against double-precision input; on flat, spiked, checkered, denormal, extreme and 1 x N maps, in every
     wrap. Those that promise the first hit are judged by a plain walk through all cells in double
-    precision that shares no code with them; all of them by what must not change: shifts by whole tiles,
-    mirror images, longer directions. Bakes: the same maps at three scales, against formulas and brute
-    force in double precision. Frames: degenerate, mirrored, needle-shaped, tiny and huge charts.
+    precision that shares no code with them, also from points of the surface up to a light; those that read
+    heights alone by their recipes, followed in double precision; all of them by what must not change: shifts
+    by whole tiles, mirror images, longer directions. On a device the same, and pictures of a relief: what
+    pixels show, its normals, and what lies in shadow. Bakes: the same maps at three scales, against formulas
+    and brute force in double precision. Frames: degenerate, mirrored, needle-shaped, tiny and huge charts.
 
     Parameters
     ----------
@@ -188,16 +194,18 @@ def stress(
         Methods of :func:`bumpwgpu.tangents`; None for all, an empty list for none.
     march : callable or None
         Tested in place of :func:`bumpwgpu.march`, with the same arguments: an implementation of one's
-        own. It returns an object with ``t``, ``z`` and ``status``.
+        own. It returns an object with ``t``, ``uv``, ``z``, ``normal`` and ``status``. Rays of group "shadow"
+        come with ``from_surface=True``.
     bake : callable or None
         Tested in place of :func:`bumpwgpu.bake`: ``bake(height_map, (name,), **options)[name]``.
     tangents : callable or None
         Tested in place of :func:`bumpwgpu.tangents`.
     only : str or None
         Only cases whose group or name contains this text, such as "grazing" or "checkerboard".
-    device : {"cpu", "gpu"}
-        Where searches run. The device takes rays in single precision, so those of double precision are
-        left out there.
+    device : {"all", "cpu", "gpu"}
+        Where searches run: everywhere, so on the device too if one answers; or in one place. The device takes
+        rays in single precision, so those of double precision are left out there. With `march`, "all" is the
+        CPU alone, and no pictures are drawn.
     rays : int, default 128
         Rays of a case, 8 to 65536.
     seed : int, default 0
@@ -226,7 +234,7 @@ def stress(
     >>> bool(bw.stress("exact", maps=["normal"], frames=[], rays=16))
     True
     """
-    choice("device", device, ("cpu", "gpu"))
+    choice("device", device, ("all", "cpu", "gpu"))
     count = whole("rays", rays, 8, 1 << 16)
     start = whole("seed", seed, 0, 1 << 32)
     for name, given in (("march", march), ("bake", bake), ("tangents", tangents), ("progress", progress)):
@@ -247,14 +255,20 @@ def stress(
     def asked(*names: str) -> bool:
         return only is None or any(only in name for name in names)
 
-    cases = [case for case in ray_cases(start, count) if asked(case.group, case.name)] if searches else []
-    if device == "gpu":
-        cases = [case for case in cases if case.dtype is np.float32]
+    answers = device == "gpu" or (device == "all" and march is None and bool(_bumpwgpu.adapters()))
+    places: list[tuple[Literal["cpu", "gpu"], RayCase]] = []
+    for case in (*ray_cases(start, count), *shadow_cases(start, count)) if searches else ():
+        if asked(case.group, case.name):
+            if device != "gpu":
+                places.append(("cpu", case))
+            if answers and case.dtype is np.float32 and case.group != "shadow":
+                places.append(("gpu", case))
+    drawn = searches if answers and march is None and asked("picture") else []
     meshes = {name: mesh for name, mesh in frame_cases(start).items() if asked("mesh", name)}
     hard = {name: heights for name, heights in hard_maps(start).items() if asked("map", name)}
-    if not (cases or (wanted and hard) or (methods and meshes)) and only is not None:
+    if not (places or drawn or (wanted and hard) or (methods and meshes)) and only is not None:
         raise ValueError(f"no case contains {only!r}")
-    total = len(cases) + len(hard) * len(wanted) + len(methods)
+    total = len(places) + len(drawn) + len(hard) * len(wanted) + len(methods)
     done = 0
     rows: list[Row] = []
 
@@ -264,12 +278,23 @@ def stress(
             progress(done, total, text)
         done += 1
 
-    for case in cases:
-        tell(f"march: {case.group}, {case.name}")
+    for place, case in places:
+        there = ", device" if place == "gpu" else ""
+        tell(f"march{there}: {case.group}, {case.name}")
         for technique in searches:
-            begin = {"subject": f"march {technique.name}", "group": case.group, "case": case.name}
-            for check in march_checks(march or march_rays, technique, case, device):
-                rows.append({**begin, **check, "at": case.at})
+            begin = {"subject": f"march {technique.name}{there}", "group": case.group, "case": case.name}
+            if case.group in ("shadow", "bundles") and technique.name not in GUARANTEED:
+                continue
+            if case.group == "shadow":
+                checks = shadow_checks(march or march_rays, technique, case)
+            else:
+                checks = march_checks(march or march_rays, technique, case, place)
+            rows.extend({**begin, **check, "at": case.at} for check in checks)
+    for technique in drawn:
+        tell(f"picture: {technique.name}")
+        begin = {"subject": f"picture {technique.name}", "group": "picture"}
+        for label, check in picture_checks(render_picture, technique, start):
+            rows.append({**begin, "case": label, **check, "at": None})
     for map_name in wanted:
         for case_name, heights in hard.items():
             tell(f"bake {map_name}: {case_name}")
@@ -285,7 +310,7 @@ def stress(
     if progress is not None:
         progress(total, total, "done")
     environment = {
-        **machine(device == "gpu"),
+        **machine(answers),
         "rays_per_case": count,
         "seed": start,
         "promise the first hit": list(GUARANTEED),
