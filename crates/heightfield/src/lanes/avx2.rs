@@ -198,9 +198,15 @@ impl Lanes for Avx2 {
     }
     #[inline(always)]
     fn largest(x: F) -> f32 {
-        let mut lanes = [0.0; 8];
-        Self::store(x, &mut lanes);
-        lanes.into_iter().fold(f32::NEG_INFINITY, |a, b| if a > b { a } else { b })
+        unsafe {
+            let four = _mm_max_ps(_mm256_castps256_ps128(x.0), _mm256_extractf128_ps::<1>(x.0));
+            let two = _mm_max_ps(four, _mm_movehl_ps(four, four));
+            _mm_cvtss_f32(_mm_max_ss(two, _mm_movehdup_ps(two)))
+        }
+    }
+    #[inline(always)]
+    fn neighbours(x: F) -> F {
+        F(unsafe { _mm256_permute_ps::<0b10_11_00_01>(x.0) })
     }
     #[inline(always)]
     fn min(a: F, b: F) -> F {

@@ -136,6 +136,10 @@ impl Lanes for Avx512 {
         unsafe { _mm512_reduce_max_ps(x.0) }
     }
     #[inline(always)]
+    fn neighbours(x: F) -> F {
+        F(unsafe { _mm512_permute_ps::<0b10_11_00_01>(x.0) })
+    }
+    #[inline(always)]
     fn min(a: F, b: F) -> F {
         F(unsafe { _mm512_min_ps(a.0, b.0) })
     }

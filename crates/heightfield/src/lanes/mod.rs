@@ -89,6 +89,8 @@ pub trait Lanes: Copy + Send + Sync + 'static {
     fn expand(chosen: Self::M, from: &[f32], others: Self::F) -> Self::F;
     /// The largest lane.
     fn largest(x: Self::F) -> f32;
+    /// Lanes 0 and 1 swapped, 2 and 3, and so on; a lane without a neighbour stays.
+    fn neighbours(x: Self::F) -> Self::F;
     /// The smaller.
     fn min(a: Self::F, b: Self::F) -> Self::F;
     /// The larger.

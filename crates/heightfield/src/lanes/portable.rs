@@ -120,6 +120,10 @@ impl<const N: usize> Lanes for Portable<N> {
         x.0.into_iter().fold(f32::NEG_INFINITY, |a, b| if a > b { a } else { b })
     }
     #[inline(always)]
+    fn neighbours(x: Self::F) -> Self::F {
+        Array(from_fn(|i| x.0[(i ^ 1).min(N - 1)]))
+    }
+    #[inline(always)]
     fn min(a: Self::F, b: Self::F) -> Self::F {
         zip(a, b, |a, b| if a < b { a } else { b })
     }

@@ -52,6 +52,11 @@ impl Kernel for Everything<'_> {
             mask(L::odd(L::to_int(L::floor(a))), &mut results);
             assert_eq!(L::largest(a), ca.iter().copied().fold(f32::MIN, f32::max));
             float(L::select(less, a, b), &mut results);
+            let mut swapped = [0.0; 16];
+            L::store(L::neighbours(a), &mut swapped);
+            for i in 0..width {
+                assert_eq!(swapped[i], ca[(i ^ 1).min(width - 1)]);
+            }
             float(L::to_float(L::to_int(L::floor(a))), &mut results);
             for m in [less, not_more, !less, less & !not_more, less | not_more, L::first(width / 2)] {
                 mask(m, &mut results);

@@ -17,8 +17,8 @@ const STREAMS: usize = 2;
 /// Most coarse steps in a row.
 const STEPS: usize = 32;
 
-/// Rays of all packets in flight that may still step when the others look at their cells.
-const IDLE: u32 = 2;
+/// Rays of all packets in flight that may still step when all go on from cell to cell.
+const IDLE: u32 = 8;
 
 /// Most cells a ray is walked through in a row.
 const CELLS: usize = 8;
@@ -234,7 +234,7 @@ fn look<L: Lanes>(
         inverse,
         ahead: [L::select(L::lt(zero, inverse[0]), one, zero), L::select(L::lt(zero, inverse[1]), one, zero)],
         room: L::narrow(above),
-        going: active & !packet.running,
+        going: active,
     };
     let inner = gx.inner(number[0], CELLS) & gy.inner(number[1], CELLS);
     let walk = if L::any(!inner) {

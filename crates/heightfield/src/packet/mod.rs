@@ -108,7 +108,7 @@ fn descend<L: Lanes>(
         if next < places && old <= LEFT {
             let to = (next + BATCH).min(places);
             block.fill::<L>(field, chunk, next..to, bundles);
-            bundles.descend::<L>(block, margins, &gx, &gy);
+            bundles.descend::<L>(block, !chunk.order.is_empty(), margins, &gx, &gy);
             (next, rounds) = (to, 0);
         } else if old == 0 {
             return;
