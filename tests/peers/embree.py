@@ -9,6 +9,9 @@ threads. What is timed, in turns and best of several:
 * Embree: `Scene.ray_intersect_preliminary` on rays that already lie in Dr.Jit arrays, evaluated to the
   ray parameter; compiled beforehand, with and without Embree's flag for coherent rays, the faster counts.
 
+Between turns there is a pause, and each call that counts follows one that does not: threads of the one side
+would still turn in circles in the time of the other, and find the caches full of its data.
+
 Rays are marched in the order of a picture and shuffled. The build is timed once.
 """
 
@@ -40,6 +43,8 @@ THREADS = int(os.environ["RAYON_NUM_THREADS"])
 SHIFTS = (0.13, 0.65, 3.2)
 #: Along no axis and no diagonal, rather along u, so that few tiles are crossed.
 AZIMUTH = 0.2
+#: Seconds in which the threads of the side before fall asleep; until then they turn in circles.
+PAUSE = 0.1
 #: What a triangle has cost at most, building included.
 BYTES_A_TRIANGLE = 300
 
@@ -122,12 +127,12 @@ class Embree:
 
 
 def best(contestants: dict[str, Callable[[], Any]], repeats: int) -> dict[str, float]:
-    """Seconds of the best of several turns; each has run once before."""
-    for call in contestants.values():
-        call()
+    """Seconds of the best of several turns, each right after one that is not counted."""
     seconds = dict.fromkeys(contestants, np.inf)
     for _ in range(repeats):
         for name, call in contestants.items():
+            time.sleep(PAUSE)
+            call()
             start = time.perf_counter()
             call()
             seconds[name] = min(seconds[name], time.perf_counter() - start)
