@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import warnings
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -248,6 +249,39 @@ def test_a_renderer_draws_what_render_draws(technique: str, silhouettes: bool) -
         assert sent[0] > 50_000
         assert max(sent[1], sent[2], sent[3], sent[4]) < 2_000
         assert all(frame.stats["pipelines_compiled"] == 0 for frame in together[1:])
+
+
+@pytest.mark.gpu
+@pytest.mark.slow
+def test_a_first_picture_comes_quickly(tmp_path: Path) -> None:
+    """In a new process, NumPy's import included, with and without programs that the driver has kept."""
+    code = (
+        "import time; start = time.perf_counter()\n"
+        "import bumpwgpu as bw; imported = time.perf_counter()\n"
+        "wall = bw.HeightMap.procedural('bricks', 256, scale=0.05)\n"
+        "frame = bw.render(bw.Mesh.quad(), bw.Material(height=wall), technique='relief', size=512)\n"
+        "print(imported - start, time.perf_counter() - imported, frame.color[..., 3].max())\n"
+    )
+    # The best of several, since other work may be running.
+    imports, cold, warm = [], [], []
+    for turn in range(4):
+        for pictures in (cold, warm):
+            done = subprocess.run(
+                [sys.executable, "-c", code],
+                env={**os.environ, "MESA_SHADER_CACHE_DIR": str(tmp_path / str(turn))},
+                capture_output=True,
+                text=True,
+                timeout=120,
+                check=True,
+            )
+            seconds, picture, opaque = map(float, done.stdout.split())
+            assert opaque == 255
+            imports.append(seconds)
+            pictures.append(picture)
+    print(f"import {min(imports):.3f} s, first picture {min(cold):.2f} s cold, {min(warm):.2f} s warm")
+    assert min(imports) < 0.15
+    assert min(cold) < 1
+    assert min(warm) < 1
 
 
 @pytest.mark.gpu
