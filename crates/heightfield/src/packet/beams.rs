@@ -18,7 +18,7 @@ pub const BUNDLE: usize = 64;
 /// Bundles in a batch, at most. A whole number of vectors.
 const BUNDLES: usize = (BATCH / BUNDLE).next_multiple_of(32);
 
-/// Farthest position, in cells, that `f32` gives well within the half cell that is allowed for it.
+/// Farthest position, in cells, whose rounding [`ALLOWANCE`] has room for.
 const FARTHEST: f32 = (1 << 18) as f32;
 /// Allowed for the overshoot of steps, 1/8 cell, and for rounding: five times 2^-24 of a position.
 const ALLOWANCE: f32 = 0.25;
